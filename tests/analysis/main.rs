@@ -11,6 +11,7 @@ mod locator;
 mod metrics;
 mod models;
 mod reduction;
+mod relations;
 mod sample;
 mod session;
 mod timebase;

@@ -130,8 +130,7 @@ pub(super) fn fitted(
         problem.descend(parameters_of(start)),
     ];
     let coarse = best(&ends, start)?;
-    let problem = problem.with_fine_bound(&coarse.parameters);
-    let fine = minimise(&problem, coarse.parameters).parameters;
+    let fine = problem.last_fit(coarse).1.parameters;
     is_plausible(start, &fine).then(|| with_parameters(start, &fine))
 }
 

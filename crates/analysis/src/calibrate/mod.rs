@@ -164,11 +164,7 @@ impl Fit {
             count,
             ..
         } = *problem;
-        let problem = problem.with_fine_bound(&coarse.parameters);
-        let mut fine = minimise(&problem, coarse.parameters);
-        if fine.termination.is_converged() {
-            fine.parameters = polish(&problem, fine.parameters);
-        }
+        let (problem, fine) = problem.last_fit(coarse);
         let end = if is_plausible(start, &fine.parameters) {
             &fine
         } else {
@@ -259,6 +255,23 @@ impl<'a> Problem<'a> {
             end = minimise(&of(count), end.parameters);
         }
         end
+    }
+
+    /// The last fit from a coarse solution, and its problem. The bound follows from the coarse solution, whose missing digits
+    /// would be missing in the last fit too.
+    fn last_fit(&self, coarse: &Descent) -> (Problem<'a>, Descent) {
+        let problem = self.with_fine_bound(&self.polished(coarse));
+        let fine = minimise(&problem, coarse.parameters);
+        let parameters = problem.polished(&fine);
+        (problem, Descent { parameters, ..fine })
+    }
+
+    fn polished(&self, descent: &Descent) -> Parameters {
+        if descent.termination.is_converged() {
+            polish(self, descent.parameters)
+        } else {
+            descent.parameters
+        }
     }
 
     /// The problem with the bound of the last fit, from the errors at `parameters`.

@@ -71,13 +71,13 @@ impl Scales {
                 for polarity in 0..2 {
                     let idle = self.idle_per_s[k][polarity] * camera.seconds[phase];
                     let added = f64::from(camera.events[phase][polarity]) - idle;
-                    own[2 * i + polarity] = self.logarithm(k, polarity, added);
+                    own[2 * i + polarity] = logarithm(added, self.idle_per_s[k][polarity]);
                     events += added.max(0.0);
                 }
                 let image = &camera.images[i];
                 let idle: f64 = self.idle_per_s[k].iter().sum();
                 let changed = image.changed as f64 - idle * camera.seconds[phase];
-                own[12 + i] = self.logarithm(k, 0, changed);
+                own[12 + i] = logarithm(changed, idle);
                 for axis in 0..2 {
                     own[4 + 2 * i + axis] = libm::log(image.spread[axis].max(1.0));
                     own[8 + 2 * i + axis] = libm::log(image.peaks[axis].max(1) as f64);
@@ -90,12 +90,11 @@ impl Scales {
             events: events.max(1.0),
         }
     }
+}
 
-    /// Logarithm of events beyond the idle ones; flat where these hide them. Idle events of a fixed time, not of the phase.
-    fn logarithm(&self, k: usize, polarity: usize, added: f64) -> f64 {
-        let idle = 0.1 * self.idle_per_s[k][polarity];
-        libm::log(added.max(0.0) + FAINT_EVENTS + FAINT_SIGMAS * idle.sqrt())
-    }
+/// Logarithm of events beyond the idle ones; flat where these hide them. Idle events of a fixed time, not of the phase.
+fn logarithm(added: f64, idle_per_s: f64) -> f64 {
+    libm::log(added.max(0.0) + FAINT_EVENTS + FAINT_SIGMAS * (0.1 * idle_per_s).sqrt())
 }
 
 #[cfg(test)]

@@ -232,6 +232,7 @@ fn zero(
         .collect();
     let habit = Habit::new(&habit)?;
     let mut rests = Vec::new();
+    let mut after_s = f64::INFINITY;
     for s in seen.iter().filter(observed) {
         let press = &presses[s.row];
         let Ok(at) = rows.binary_search_by_key(&press.press, |r| r.press) else {
@@ -239,10 +240,12 @@ fn zero(
         };
         let depth = rows[at].depth_mm.map(|d| d.value);
         rows[at].rest_mm = depth.and_then(|mm| habit.rest_mm(s.phases, mm));
-        if press.role == PressRole::Score && press.verdict == Verdict::Valid {
-            rests.extend(rows[at].rest_mm.map(|mm| (press.location.index(), mm)));
+        let scores = press.role == PressRole::Score && press.verdict == Verdict::Valid;
+        if let Some(mm) = rows[at].rest_mm.filter(|_| scores) {
+            rests.push((press.location.index(), mm));
+            let seconds = s.phases.iter().map(|p| p.seconds[AFTER]);
+            after_s = seconds.fold(after_s, f64::min);
         }
     }
-    let after_s = seen.first()?.phases[0].seconds[AFTER];
     (!rests.is_empty()).then(|| zero_return(after_s, &rests, &input.settings))
 }

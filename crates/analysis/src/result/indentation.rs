@@ -95,7 +95,7 @@ with_text!(NoQuantity);
 /// calibration presses.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ZeroReturn {
-    /// Time after the release behind it, s.
+    /// Shortest time after a release behind it, in either camera, s.
     pub after_s: f64,
     /// Mean over the scored presses, mm: what is left in the direction of the press.
     pub mean_mm: Estimate,

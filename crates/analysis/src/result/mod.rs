@@ -72,8 +72,9 @@ use crate::rule::Rule;
 /// except their summary. Version 9: causes of presses are types. Version 10: warnings, violations
 /// and evidence are. Version 11: depth and force are estimated. Version 12: the fields of the locators
 /// end their search where the likelihood gains less than 0.001. Version 13: calibrations and located
-/// positions have at least nine correct digits where the problem is well posed.
-pub const ANALYSIS_VERSION: u32 = 13;
+/// positions have at least nine correct digits where the problem is well posed. Version 14: so have held-out errors; the
+/// estimated depth treats ON and OFF alike.
+pub const ANALYSIS_VERSION: u32 = 14;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
