@@ -1,6 +1,6 @@
 //! Lines through simultaneous times, times mapped by them, and marks on a trigger line.
 
-use skinrig_analysis::clock::{Pair, fit_line, fit_marks};
+use skinrig_analysis::clock::{LineError, MarksError, Pair, fit_line, fit_marks};
 use skinrig_analysis::result::{ClockFit, ClockMethod};
 use skinrig_model::{HostTime, Mark, MarkKind, PressId, PulseTrain, SentMark, TriggerEdge};
 
@@ -35,8 +35,9 @@ pub(crate) fn solve(problem: &Problem) -> Solution {
             camera_us: row[1],
         })
         .collect();
-    let Some(line) = fit_line(&pairs, problem.number("floor_us")) else {
-        return refused(problem, "fit_line -> None");
+    let line = match fit_line(&pairs, problem.number("floor_us")) {
+        Ok(line) => line,
+        Err(why) => return refused(&MarksError::Line { line: why }),
     };
     assert_eq!(line.n(), pairs.len(), "{}: outliers", problem.name);
     Solution::Values(vec![
@@ -48,11 +49,18 @@ pub(crate) fn solve(problem: &Problem) -> Solution {
     ])
 }
 
-/// `None` has no reason: it is that of the data, unless these have a solution.
-fn refused(problem: &Problem, name: &'static str) -> Solution {
-    let outcome = match problem.outcome.as_str() {
-        "solved" => "no line",
-        other => other,
+/// The reason in the words of the data, and the type that says so.
+fn refused(why: &MarksError) -> Solution {
+    let (outcome, name) = match why {
+        MarksError::Line {
+            line: LineError::FewPairs { .. },
+        } => ("too few", "LineError::FewPairs"),
+        MarksError::Line {
+            line: LineError::NoSpread,
+        } => ("no spread", "LineError::NoSpread"),
+        MarksError::BrokenTimeBase { .. } => ("broken", "MarksError::BrokenTimeBase"),
+        MarksError::Drift { .. } => ("no clock", "MarksError::Drift"),
+        MarksError::NoChannel | MarksError::NoneSeen => ("no marks", "MarksError::NoneSeen"),
     };
     Solution::Refused(outcome.to_owned(), name, Vec::new())
 }
@@ -83,8 +91,9 @@ fn marks(problem: &Problem) -> Solution {
             rising,
         }));
     }
-    let Some(found) = fit_marks(&edges, 0, &sent) else {
-        return refused(problem, "fit_marks -> None");
+    let found = match fit_marks(&edges, 0, &sent) {
+        Ok(found) => found,
+        Err(why) => return refused(&why),
     };
     let fit = found.fit;
     assert_eq!(fit.n as usize, sent.len(), "{}: outliers", problem.name);

@@ -4,7 +4,7 @@
 use skinrig_model::CameraId;
 
 use crate::accumulate::{Accumulator, PassRequest, pass, rate_bin_us};
-use crate::clock::{align_by_rates, fit_marks};
+use crate::clock::{MarksError, align_by_rates, fit_marks};
 use crate::error::AnalysisError;
 use crate::event_cache::EventCache;
 use crate::input::{EventSource, SessionInput};
@@ -118,8 +118,12 @@ impl CameraClock {
         let k = camera.index();
         let base_clock = base.and_then(|b| b.clocks[k]);
         let by_marks = |channel| fit_marks(&input.edges[k], channel, &input.marks);
-        let channel = input.rig.trigger_channel.filter(|_| base_clock.is_none());
-        let marks = channel.and_then(by_marks);
+        let (marks, why) = match (base_clock, input.rig.trigger_channel.map(by_marks)) {
+            (Some(_), _) => (None, None),
+            (None, Some(Ok(fit))) => (Some(fit), None),
+            (None, Some(Err(why))) => (None, Some(why)),
+            (None, None) => (None, Some(MarksError::NoChannel)),
+        };
         let mut reading = Self {
             clock: base_clock.or(marks.as_ref().map(|m| m.fit)),
             rates: Some(RateHistogram::new(rate_bin_us(&input.settings))),
@@ -144,10 +148,11 @@ impl CameraClock {
         if reading.clock.is_some() {
             return Ok(reading);
         }
-        if !input.marks.is_empty() {
-            reading.warnings.push(WarningCause::FewMarks {
+        if let Some(why) = why.filter(|_| !input.marks.is_empty()) {
+            reading.warnings.push(WarningCause::NoMarksClock {
                 sent: input.marks.len(),
                 edges: input.edges[k].len(),
+                why,
             });
         }
         let wanted = PassRequest {

@@ -105,7 +105,7 @@ fn marks(input: &SessionInput, leg: usize, k: usize) -> Option<LegLine> {
     let sent = input.marks.iter().copied();
     let sent: Vec<_> = sent.filter(|m| leg_at(&input.legs, m.t) == leg).collect();
     let edges = edges_of(&input.edges[k], &input.legs, leg, k);
-    let fit = fit_marks(edges, channel, &sent)?.fit;
+    let fit = fit_marks(edges, channel, &sent).ok()?.fit;
     let sum: f64 = sent.iter().map(|m| m.t.0 as f64 * 1e-3).sum();
     Some(LegLine {
         fit,

@@ -49,7 +49,7 @@ pub(crate) fn of_session(input: &SessionInput) -> [Vec<Option<UntimedPress>>; 2]
         let k = camera.index();
         let by_base = base.as_ref().is_some_and(|b| b.clocks[k].is_some());
         let channel = input.rig.trigger_channel.filter(|_| !by_base);
-        let marks = channel.and_then(|c| fit_marks(&input.edges[k], c, &input.marks));
+        let marks = channel.and_then(|c| fit_marks(&input.edges[k], c, &input.marks).ok());
         rows(input, camera, base.as_ref(), marks.as_ref())
     })
 }

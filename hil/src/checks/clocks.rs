@@ -116,7 +116,7 @@ fn measure_camera(
             camera_us: relative(*camera_us, camera_origin),
         })
         .collect();
-    let Some(line) = fit_line(&pairs, RESIDUAL_FLOOR_US) else {
+    let Ok(line) = fit_line(&pairs, RESIDUAL_FLOOR_US) else {
         return too_few_trains(subject, sent_trains.len(), n, findings);
     };
     let half_ppm = student_quantile(0.975, line.n() as f64 - 2.0) * line.drift_se * 1e6;

@@ -6,7 +6,7 @@
 mod shifts;
 mod simulated;
 
-use skinrig_analysis::clock::{PressSpan, fit_marks, fit_rates};
+use skinrig_analysis::clock::{LineError, MarksError, PressSpan, fit_marks, fit_rates};
 use skinrig_analysis::rates::RateHistogram;
 use skinrig_analysis::result::{ClockFit, WarningCause};
 use skinrig_model::{HostTime, Mark, MarkKind, PressId, PulseTrain, SentMark, TriggerEdge};
@@ -156,11 +156,33 @@ fn too_few_marks_give_no_clock() {
         offset_us: 9e6,
         ppm: 30.0,
     };
-    let sent = marks(1);
-    assert_eq!(fit_marks(&edges_of(&sent, &planted, 0.0), 0, &sent), None);
-    assert_eq!(fit_marks(&[], 0, &marks(9)), None);
-    let sent = marks(9);
-    assert_eq!(fit_marks(&edges_of(&sent, &planted, 0.0), 6, &sent), None);
+    let refused = |planted: &PlantedClock, sent: &[SentMark], channel| {
+        let edges = edges_of(sent, planted, 0.0);
+        fit_marks(&edges, channel, sent).unwrap_err()
+    };
+    let few = MarksError::Line {
+        line: LineError::FewPairs { found: 2 },
+    };
+    assert_eq!(refused(&planted, &marks(1)[..2], 0), few);
+    assert_eq!(
+        fit_marks(&[], 0, &marks(9)).unwrap_err(),
+        MarksError::NoneSeen
+    );
+    assert_eq!(refused(&planted, &marks(9), 6), MarksError::NoneSeen);
+    // Times in another unit are seen, but are those of no clock.
+    let fast = PlantedClock {
+        ppm: 20_000.0,
+        ..planted
+    };
+    let refused = refused(&fast, &marks(9), 0);
+    let MarksError::Drift {
+        drift_ppm,
+        most_ppm: 10_000.0,
+    } = refused
+    else {
+        panic!("expected a drift that is too large, found {refused}")
+    };
+    assert!((drift_ppm - 20_000.0).abs() < 1.0, "{drift_ppm}");
 }
 
 /// The published rhythm: three sync presses 1 s apart, 3 s of rest, then a press every 3 + 1/289 s.

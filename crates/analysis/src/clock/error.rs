@@ -1,6 +1,61 @@
-//! Owns the reasons for which a camera has no clock from event rates.
+//! Owns the reasons for which a camera has no clock from trigger marks or from event rates.
 
 use serde::{Deserialize, Serialize};
+
+/// Why no line goes through pairs of simultaneous times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum LineError {
+    /// Too few pairs, or too few that agree.
+    #[error("expected at least 3 times seen on both clocks, found {found}")]
+    FewPairs {
+        /// Pairs.
+        found: usize,
+    },
+    /// Only one time, to working precision.
+    #[error("expected times apart, found the same time in all pairs")]
+    NoSpread,
+}
+
+/// Why the trigger marks give a camera no clock.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum MarksError {
+    /// The rig does not say which input of the cameras shows marks.
+    #[error("the rig has no trigger channel")]
+    NoChannel,
+    /// The camera's trigger input shows no complete mark.
+    #[error("the trigger input shows no mark")]
+    NoneSeen,
+    /// The marks that were sent and seen determine no line.
+    #[error("{line}")]
+    Line {
+        /// Why not.
+        line: LineError,
+    },
+    /// The line is not that of a clock.
+    #[error("expected a drift of at most {most_ppm:.0} ppm, found {drift_ppm:.0} ppm")]
+    Drift {
+        /// Drift of the line, ppm.
+        drift_ppm: f64,
+        /// Maximum of a clock, ppm.
+        most_ppm: f64,
+    },
+    /// The camera times come from a broken time base.
+    #[error(
+        "expected camera times below 2^62 µs, found a mark at {t_us} µs: the time base of the stream is broken"
+    )]
+    BrokenTimeBase {
+        /// Time of the mark, µs.
+        t_us: u64,
+    },
+}
+
+impl From<LineError> for MarksError {
+    fn from(line: LineError) -> Self {
+        Self::Line { line }
+    }
+}
 
 /// Why the presses in the event rates of a camera give no clock.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]

@@ -3,6 +3,8 @@
 //! Times are differences from exact integer references, so that hours in µs lose no digits: the fit sees only the small
 //! deviation of the camera clock from the host clock.
 
+use super::error::LineError;
+
 /// One pair of simultaneous times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
@@ -52,12 +54,13 @@ const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
 /// Fits a line robustly: median of the slopes between pairs half the session apart (Theil 1950, with the pairing that keeps
 /// it linear in time), then least squares on the pairs within five robust standard deviations, but at least `floor_us`, µs.
-/// `None` with fewer than 3 usable pairs or no spread in time.
-#[must_use]
-pub fn fit(pairs: &[Pair], floor_us: f64) -> Option<Line> {
+///
+/// # Errors
+/// [`LineError`] with fewer than 3 usable pairs, or no spread in time.
+pub fn fit(pairs: &[Pair], floor_us: f64) -> Result<Line, LineError> {
     let n = pairs.len();
     if n < 3 {
-        return None;
+        return Err(LineError::FewPairs { found: n });
     }
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| pairs[*a].host_us.total_cmp(&pairs[*b].host_us));
@@ -76,14 +79,15 @@ pub fn fit(pairs: &[Pair], floor_us: f64) -> Option<Line> {
         .filter(|(a, b)| b.0 > a.0)
         .map(|(a, b)| (b.1 - a.1) / (b.0 - a.0))
         .collect();
-    let mut slope = median(&mut slopes)?;
+    let mut slope = median(&mut slopes).ok_or(LineError::NoSpread)?;
     let mut at: Vec<f64> = points.iter().map(|(x, y)| y - slope * x).collect();
-    let mut intercept = median(&mut at)?;
+    let mut intercept = median(&mut at).ok_or(LineError::NoSpread)?;
     let mut used = vec![false; n];
     for _ in 0..ROUNDS {
         let residual = |&(x, y): &(f64, f64)| y - intercept - slope * x;
         let mut sizes: Vec<f64> = points.iter().map(|p| residual(p).abs()).collect();
-        let sigma = (MAD_TO_SIGMA * median(&mut sizes)?).max(floor_us);
+        let sigma = MAD_TO_SIGMA * median(&mut sizes).ok_or(LineError::NoSpread)?;
+        let sigma = sigma.max(floor_us);
         let now: Vec<bool> = points
             .iter()
             .map(|p| residual(p).abs() <= OUTLIER_SIGMAS * sigma)
@@ -92,7 +96,7 @@ pub fn fit(pairs: &[Pair], floor_us: f64) -> Option<Line> {
             break;
         }
         used = now;
-        (slope, intercept) = least_squares(&points, &used)?;
+        (slope, intercept) = least_squares(&points, &used).ok_or(LineError::NoSpread)?;
     }
     let inliers: Vec<(f64, f64)> = points
         .iter()
@@ -109,9 +113,10 @@ pub fn fit(pairs: &[Pair], floor_us: f64) -> Option<Line> {
         .collect();
     let squares: f64 = residuals.iter().map(|r| r * r).sum();
     if inliers.len() < 3 {
-        return None;
+        let found = inliers.len();
+        return Err(LineError::FewPairs { found });
     }
-    Some(Line {
+    Ok(Line {
         offset_us: (y0 - x0) + intercept - slope * x0,
         drift: slope,
         drift_se: (squares / (count - 2.0) / spread).sqrt(),

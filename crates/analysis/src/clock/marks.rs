@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use skinrig_model::pulse::{LOOPBACK, decode_marks};
 use skinrig_model::{Mark, SentMark, TriggerEdge};
 
+use super::error::MarksError;
 use super::line::{self, Pair};
 use super::{NO_CLOCK_DRIFT, NO_TIME_US};
 use crate::result::{ClockFit, ClockMethod, WarningCause};
@@ -30,11 +31,17 @@ pub struct MarksFit {
 
 /// Fits a camera's clock from the edges on its trigger channel and the marks that were sent.
 ///
-/// `None` if fewer than three marks match, if they are not on a plausible line, or if their camera times are beyond 2^62 µs;
-/// the session must then be aligned by its presses. Marks sent or seen several times (a repeated attempt sends the same name
+/// Marks sent or seen several times (a repeated attempt sends the same name
 /// again) are matched by time after the others have given a first fit.
-#[must_use]
-pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Option<MarksFit> {
+///
+/// # Errors
+/// [`MarksError`] if fewer than three marks match, if they are not on the line of a clock, or if their camera times are beyond
+/// 2^62 µs. The session must then be aligned by its presses.
+pub fn fit_marks(
+    edges: &[TriggerEdge],
+    channel: u8,
+    sent: &[SentMark],
+) -> Result<MarksFit, MarksError> {
     let on_channel: Vec<TriggerEdge> = edges
         .iter()
         .copied()
@@ -52,9 +59,9 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
         seen_by.entry(mark.mark).or_default().push(mark.t_us);
     }
     // Camera times relative to the first mark, exactly, so that large counters lose no digits.
-    let reference = decoded.marks.first()?.t_us;
-    if decoded.marks.iter().any(|m| m.t_us >= NO_TIME_US) {
-        return None;
+    let reference = decoded.marks.first().ok_or(MarksError::NoneSeen)?.t_us;
+    if let Some(mark) = decoded.marks.iter().find(|m| m.t_us >= NO_TIME_US) {
+        return Err(MarksError::BrokenTimeBase { t_us: mark.t_us });
     }
     let relative = |t_us: u64| t_us.wrapping_sub(reference) as i64 as f64;
 
@@ -99,7 +106,13 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
             }
         }
     }
-    let line = line::fit(&pairs, FLOOR_US).filter(|l| l.drift.abs() <= NO_CLOCK_DRIFT)?;
+    let line = line::fit(&pairs, FLOOR_US)?;
+    if line.drift.abs() > NO_CLOCK_DRIFT {
+        return Err(MarksError::Drift {
+            drift_ppm: line.drift * 1e6,
+            most_ppm: NO_CLOCK_DRIFT * 1e6,
+        });
+    }
     let fit = ClockFit {
         method: ClockMethod::TriggerMarks,
         offset_us: reference as f64 + line.offset_us,
@@ -133,7 +146,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
         let edges = decoded.stray_edges;
         warnings.push(WarningCause::StrayEdges { edges, channel });
     }
-    Some(MarksFit {
+    Ok(MarksFit {
         fit,
         warnings,
         seen_us,

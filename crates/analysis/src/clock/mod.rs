@@ -13,7 +13,7 @@ mod shifts;
 mod span;
 mod tally;
 
-pub use error::RatesError;
+pub use error::{LineError, MarksError, RatesError};
 pub use line::{Line, Pair, fit as fit_line};
 pub use marks::{MarksFit, fit_marks};
 pub use presses::{RatesAlignment, RatesFit, align_by_rates, fit_rates};

@@ -44,7 +44,7 @@ fn refine_once(
     let profile = Profile::new(activity, presses, map);
     let pairs = lags(activity, presses, map, &profile, lag_us);
     let few = RatesError::FewVisible { found: pairs.len() };
-    let line = line::fit(&pairs, FLOOR_US).ok_or(few)?;
+    let line = line::fit(&pairs, FLOOR_US).map_err(|_| few)?;
     map.offset_us = line.offset_us;
     map.drift = line.drift;
     if line.drift_se > UNKNOWN_DRIFT {

@@ -184,8 +184,8 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "camera 1: 5 edges on trigger channel 0 do not belong to a complete mark",
         ),
         (
-            json!({"camera": "camera1", "kind": "few_marks", "sent": 2, "edges": 9}),
-            "camera 1: too few trigger marks to fit the clock (2 sent, 9 edges seen): using event rates instead",
+            json!({"camera": "camera1", "kind": "no_marks_clock", "sent": 2, "edges": 9, "why": {"kind": "line", "line": {"kind": "few_pairs", "found": 2}}}),
+            "camera 1: no clock from trigger marks (2 sent, 9 edges seen): expected at least 3 times seen on both clocks, found 2; using event rates instead",
         ),
         (
             json!({"camera": "camera1", "kind": "no_rates_clock", "why": {"kind": "no_bursts"}}),

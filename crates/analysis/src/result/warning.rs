@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::{CalibrationModel, CameraId, Locator, PressId};
 
 use super::Estimate;
-use crate::clock::RatesError;
+use crate::clock::{MarksError, RatesError};
 use crate::exclusion::Exclusion;
 use crate::locator::FitError;
 use crate::with_text::with_text;
@@ -127,15 +127,17 @@ pub enum WarningCause {
         /// Trigger channel.
         channel: u8,
     },
-    /// Too few trigger marks for a clock.
+    /// The trigger marks give no clock.
     #[error(
-        "too few trigger marks to fit the clock ({sent} sent, {edges} edges seen): using event rates instead"
+        "no clock from trigger marks ({sent} sent, {edges} edges seen): {why}; using event rates instead"
     )]
-    FewMarks {
+    NoMarksClock {
         /// Marks sent.
         sent: usize,
         /// Edges seen, all channels.
         edges: usize,
+        /// Why not.
+        why: MarksError,
     },
     /// The event rates give no clock.
     #[error("no clock alignment: {why}")]

@@ -33,7 +33,7 @@ pub(super) fn clock<'a>(
             }
         }
     }
-    let line = line::fit(&trains, 1.0)?;
+    let line = line::fit(&trains, 1.0).ok()?;
     let drift = best_drift(pieces, k)?;
     let off = |t: &Pair| t.camera_us - t.host_us - drift.value * t.host_us;
     let used = || trains.iter().zip(&line.used).filter(|(_, used)| **used);

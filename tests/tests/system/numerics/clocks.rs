@@ -2,7 +2,7 @@
 //! times out of order.
 
 use skinrig_analysis::analyze;
-use skinrig_analysis::clock::{PressSpan, RatesError, fit_marks, fit_rates};
+use skinrig_analysis::clock::{MarksError, PressSpan, RatesError, fit_marks, fit_rates};
 use skinrig_analysis::rates::RateHistogram;
 use skinrig_analysis::result::{ClockFit, ClockMethod, Warning, WarningCause};
 use skinrig_analysis::segment::windows;
@@ -202,7 +202,11 @@ fn invalid_times_give_no_clock_and_a_reason() {
             .iter()
             .flat_map(|m| train(m.mark, base_us + m.t.0 as u64 / 1000))
             .collect();
-        assert_eq!(fit_marks(&edges, 0, &sent), None);
+        let refused = fit_marks(&edges, 0, &sent).unwrap_err();
+        let MarksError::BrokenTimeBase { t_us } = refused else {
+            panic!("expected a broken time base, found {refused}")
+        };
+        assert!(t_us >= 1 << 62, "{t_us}");
         let (mut input, mut source) = session();
         let mut count = 0;
         for k in 0..2 {

@@ -78,7 +78,7 @@ impl SmoothMap {
                 camera_us: p.to_us,
             })
             .collect();
-        let line = line::fit(&pairs, floor_us)?;
+        let line = line::fit(&pairs, floor_us).ok()?;
         let span = points.last()?.from_us - points.first()?.from_us;
         // A wandering clock deviates from a line by more than the outlier bound: start with all points, except those further
         // from it than any plausible clock.

@@ -4,6 +4,7 @@ mod presses;
 mod provenance;
 pub(crate) mod studies;
 
+use skinrig_analysis::clock::MarksError;
 use skinrig_analysis::result::*;
 use skinrig_model::*;
 
@@ -216,7 +217,11 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         warnings: vec![Warning {
             leg: None,
             camera: Some(CameraId::Two),
-            cause: WarningCause::FewMarks { sent: 14, edges: 3 },
+            cause: WarningCause::NoMarksClock {
+                sent: 14,
+                edges: 3,
+                why: MarksError::NoneSeen,
+            },
         }],
         pictures,
         zooms,
