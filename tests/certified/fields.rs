@@ -1,7 +1,7 @@
 //! Positions located by learnt fields.
 
 use serde_json::Value;
-use skinrig_analysis::locator::{Features, FittedLocator};
+use skinrig_analysis::locator::{Features, FittedLocator, LocatorModelError};
 use skinrig_analysis::result::{CameraField, FieldModel, FieldPoint, LocatorModel, PositionPrior};
 use skinrig_model::{Locator, StereoGeometry};
 
@@ -49,12 +49,13 @@ pub(crate) fn solve(problem: &Problem) -> Solution {
         inflation: 1.0,
         levels: Vec::new(),
     };
-    let Some(locator) = FittedLocator::new(Locator::Direct, StereoGeometry::PAPER, model) else {
-        return Solution::Refused(
-            "singular".to_owned(),
-            "FittedLocator::new -> None",
-            Vec::new(),
-        );
+    let locator = match FittedLocator::new(Locator::Direct, StereoGeometry::PAPER, model) {
+        Ok(locator) => locator,
+        Err(LocatorModelError::Singular) => {
+            let name = "LocatorModelError::Singular";
+            return Solution::Refused("singular".to_owned(), name, Vec::new());
+        }
+        Err(other) => panic!("{}: {other}", problem.name),
     };
     let columns = problem.numbers("columns_px");
     let features = Features {

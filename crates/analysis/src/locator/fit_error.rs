@@ -1,7 +1,8 @@
-//! Owns the reasons for which a locator cannot learn.
+//! Owns the reasons for which a locator cannot learn, or not be made from its serialised form.
 
 use serde::{Deserialize, Serialize};
 
+use crate::calibrate::PARAMETERS;
 use crate::with_text::with_text;
 
 /// Why a method could not be fitted.
@@ -25,3 +26,17 @@ pub enum FitError {
 }
 
 with_text!(FitError);
+
+/// Why a serialised locator gives none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LocatorModelError {
+    /// A covariance has another size than the parameters of the geometry.
+    #[error("expected covariances of {n} by {n}, found another size", n = PARAMETERS)]
+    CovarianceSize,
+    /// Fields without a prior, a prior without fields, or a polynomial for one camera only.
+    #[error("expected fields and polynomials for both cameras, with a prior, or for none")]
+    Incomplete,
+    /// The prior or the kernel of a field is not positive definite, or its residuals are not finite.
+    #[error("expected a prior and fields of positive variance, found singular ones")]
+    Singular,
+}

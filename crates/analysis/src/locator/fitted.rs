@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use skinrig_model::{Locator, Point2, SkinOutline, StereoGeometry};
 
 use super::features::{CameraFeatures, Features};
+use super::fit_error::LocatorModelError;
 use super::inverse::Inverse;
 use super::prediction::{Prediction, Uncertainty, ellipse};
 use super::rays::Rays;
@@ -41,18 +42,25 @@ enum Solver {
     Inverse(Box<Inverse>),
 }
 
-/// The covariance with these rows, if there is one; `None` if it has another size than the parameters.
-fn matrix(rows: Option<&[Vec<f64>]>) -> Option<Option<DMatrix<f64>>> {
-    let Some(rows) = rows else { return Some(None) };
+/// The covariance with these rows, if there is one.
+fn matrix(rows: Option<&[Vec<f64>]>) -> Result<Option<DMatrix<f64>>, LocatorModelError> {
+    let Some(rows) = rows else { return Ok(None) };
     let size = PARAMETERS;
     let fits = rows.len() == size && rows.iter().all(|r| r.len() == size);
     fits.then(|| Some(DMatrix::from_fn(size, size, |i, j| rows[i][j])))
+        .ok_or(LocatorModelError::CovarianceSize)
 }
 
 impl FittedLocator {
-    /// From its serialised form and the geometry of the analysis; `None` if the form contradicts itself.
-    #[must_use]
-    pub fn new(locator: Locator, geometry: StereoGeometry, model: LocatorModel) -> Option<Self> {
+    /// From its serialised form and the geometry of the analysis.
+    ///
+    /// # Errors
+    /// [`LocatorModelError`] if the form contradicts itself or is singular.
+    pub fn new(
+        locator: Locator,
+        geometry: StereoGeometry,
+        model: LocatorModel,
+    ) -> Result<Self, LocatorModelError> {
         let covariance = matrix(model.geometry_covariance.as_deref())?;
         let remount = matrix(model.remount_covariance.as_deref())?;
         let way = match (&model.cameras, &model.prior) {
@@ -64,19 +72,16 @@ impl FittedLocator {
                         covariance,
                         remount,
                     },
-                    _ => return None,
+                    _ => return Err(LocatorModelError::Incomplete),
                 };
-                Solver::Inverse(Box::new(Inverse::new(
-                    reading,
-                    [one, two],
-                    prior,
-                    size(&model, LEVEL),
-                )?))
+                let inverse = Inverse::new(reading, [one, two], prior, size(&model, LEVEL))
+                    .ok_or(LocatorModelError::Singular)?;
+                Solver::Inverse(Box::new(inverse))
             }
             (None, None) => Solver::Rays(Box::new(Rays::new(&geometry, covariance))),
-            _ => return None,
+            _ => return Err(LocatorModelError::Incomplete),
         };
-        Some(Self {
+        Ok(Self {
             locator,
             geometry,
             model,
@@ -108,7 +113,8 @@ impl FittedLocator {
     #[must_use]
     pub fn of(analysis: &Analysis) -> Self {
         let stored = analysis.locator.as_ref();
-        let learnt = stored.and_then(|l| Self::new(l.locator, analysis.geometry, l.model.clone()));
+        let learnt =
+            stored.and_then(|l| Self::new(l.locator, analysis.geometry, l.model.clone()).ok());
         learnt.unwrap_or_else(|| Self::rays(analysis.geometry))
     }
 

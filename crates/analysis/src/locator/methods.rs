@@ -124,7 +124,7 @@ impl Method for Geometry {
             levels: Vec::new(),
         };
         let fitted = FittedLocator::new(Locator::Geometry, start.geometry, model);
-        fitted.map(|f| (f, None)).ok_or(FitError::Degenerate)
+        fitted.map(|f| (f, None)).map_err(|_| FitError::Degenerate)
     }
 }
 
@@ -220,7 +220,8 @@ fn with_fields(
         inflation: 1.0,
         levels: Vec::new(),
     };
-    let fitted = FittedLocator::new(locator, start.geometry, model).ok_or(FitError::Degenerate)?;
+    let fitted =
+        FittedLocator::new(locator, start.geometry, model).map_err(|_| FitError::Degenerate)?;
     Ok((fitted, Some(Hyperparameters([logs_one, logs_two]))))
 }
 

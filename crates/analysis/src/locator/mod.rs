@@ -29,7 +29,7 @@ mod spread;
 pub(crate) use choose::{Effort, choose};
 pub use choose::{LocatorChoice, choose_locator, held_out_errors};
 pub use features::{CameraFeatures, Features};
-pub use fit_error::FitError;
+pub use fit_error::{FitError, LocatorModelError};
 pub use fitted::{FittedLocator, Location};
 pub use methods::{Feature, FitStart, Hyperparameters, Method, Requirements, method};
 pub(crate) use quasi_newton::{ValueAndGradient, minimise};

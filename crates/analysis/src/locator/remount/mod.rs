@@ -274,7 +274,7 @@ impl EarlierCalibration {
             }
         }
         let fitted = FittedLocator::new(self.locator.locator, geometry, model.clone())
-            .ok_or(RecalibrationError::Degenerate)?;
+            .map_err(|_| RecalibrationError::Degenerate)?;
         Ok(LocatorChoice {
             fitted,
             result: LocatorResult {
