@@ -322,10 +322,10 @@ fn bootstrap(places: &[LocationErrors], resamples: u32, seed: u64) -> [Option<(f
     })
 }
 
-/// Probability outside the percentile interval of a bootstrap over so many locations (at least 2) on each side. Percentiles at
+/// Probability outside the percentile interval of a bootstrap over so many locations on each side. Percentiles at
 /// [`TAIL`] are too narrow, as a normal interval is that ignores that its scale is estimated and divides by n instead of n - 1.
-fn tail(places: usize) -> f64 {
-    let n = places as f64;
+pub(crate) fn tail(places: usize) -> f64 {
+    let n = places.max(2) as f64;
     let wider = student_quantile(1.0 - TAIL, n - 1.0) * (n / (n - 1.0)).sqrt();
     normal_cdf(-wider)
 }
