@@ -6,6 +6,7 @@ mod clocks;
 mod clustering;
 mod coverage;
 mod geometry;
+mod intervals;
 mod latency;
 mod locator;
 mod metrics;

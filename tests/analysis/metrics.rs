@@ -7,7 +7,7 @@ use skinrig_analysis::sets::ScoreSet;
 use skinrig_model::{LocationId, Point2, PressId, PressRole, RepetitionId, SkinOutline, Verdict};
 
 /// A scored press at (10 + location, 2) whose estimate is off by `error`; `None`: no estimate.
-fn row(location: u32, error: Option<(f64, f64)>, verdict: Verdict) -> PressResult {
+pub(crate) fn row(location: u32, error: Option<(f64, f64)>, verdict: Verdict) -> PressResult {
     let truth = Point2::new(10.0 + f64::from(location), 2.0);
     PressResult {
         press: PressId::from_index(0),

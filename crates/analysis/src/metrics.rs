@@ -1,12 +1,13 @@
 //! Localisation metrics: errors over the scored presses, with bootstrap intervals.
 //!
-//! Intervals are percentile intervals of a bootstrap that resamples *locations* with all their repetitions, because presses
-//! at one location share its systematic error. Shares of 0 and 1, which no resample changes, get exact binomial intervals
+//! Intervals are expanded percentile intervals (Hesterberg 2015) of a bootstrap that resamples *locations* with all their
+//! repetitions, because presses at one location share its systematic error. Shares of 0 and 1, which no resample changes, get exact binomial intervals
 //! over the locations.
 
 use rayon::prelude::*;
 use skinrig_model::{Point2, SkinOutline, quantile as sorted_quantile};
 
+use crate::distributions::{normal_cdf, student_quantile};
 use crate::exact;
 use crate::result::{Estimate, Metrics, PenalisedRmse};
 use crate::seeded;
@@ -15,6 +16,11 @@ use crate::sums::{self, Sum};
 
 /// Probability outside a 95 % interval on each side.
 const TAIL: f64 = 0.025;
+/// Fewest locations with an interval of the 95th percentile: with fewer, the largest error is below it with a chance above
+/// [`TAIL`], and so may be the whole interval.
+const P95_LOCATIONS: usize = 72;
+/// Index of the 95th percentile.
+const P95: usize = 6;
 /// Number of metrics with an interval, in the order of [`Values`].
 const COUNT: usize = 10;
 /// (value, n) of each metric: rmse, x, y, bias x, bias y, median, p95, repeat std, located rate, within
@@ -223,14 +229,14 @@ pub(crate) fn mean(values: &mut [f64]) -> Option<f64> {
     sums::mean(values.iter().copied())
 }
 
-/// Mean of all values, with the percentile interval of a bootstrap over whole locations. Each value comes with its location,
+/// Mean of all values, with the expanded percentile interval of a bootstrap over whole locations. Each value comes with its location,
 /// in any order.
 #[must_use]
 pub fn mean_over_locations(values: &[(u32, f64)], resamples: u32, seed: u64) -> Estimate {
     bootstrap_over_locations(values, resamples, seed, mean)
 }
 
-/// `statistic` of all values, with the percentile interval of a bootstrap over whole locations. Each value comes with its
+/// `statistic` of all values, with the expanded percentile interval of a bootstrap over whole locations. Each value comes with its
 /// location, in any order; `statistic` may reorder its input.
 pub(crate) fn bootstrap_over_locations(
     values: &[(u32, f64)],
@@ -259,8 +265,9 @@ pub(crate) fn bootstrap_over_locations(
                 statistic(&mut drawn)
             })
             .collect();
-        low = quantile(&mut samples, TAIL);
-        high = quantile(&mut samples, 1.0 - TAIL);
+        let tail = tail(places.len());
+        low = quantile(&mut samples, tail);
+        high = quantile(&mut samples, 1.0 - tail);
     }
     Estimate {
         value,
@@ -302,13 +309,25 @@ fn bootstrap(places: &[LocationErrors], resamples: u32, seed: u64) -> [Option<(f
             evaluate(&drawn)
         })
         .collect();
+    let tail = tail(places.len());
     std::array::from_fn(|k| {
+        if k == P95 && places.len() < P95_LOCATIONS {
+            return None;
+        }
         let mut values: Vec<f64> = samples.iter().filter_map(|s| s[k].0).collect();
         Some((
-            quantile(&mut values, TAIL)?,
-            quantile(&mut values, 1.0 - TAIL)?,
+            quantile(&mut values, tail)?,
+            quantile(&mut values, 1.0 - tail)?,
         ))
     })
+}
+
+/// Probability outside the percentile interval of a bootstrap over so many locations on each side. Percentiles at
+/// [`TAIL`] are too narrow, as a normal interval is that ignores that its scale is estimated and divides by n instead of n - 1.
+pub(crate) fn tail(places: usize) -> f64 {
+    let n = places.max(2) as f64;
+    let wider = student_quantile(1.0 - TAIL, n - 1.0) * (n / (n - 1.0)).sqrt();
+    normal_cdf(-wider)
 }
 
 /// [`sorted_quantile`] of values in any order, in linear time; `None` without values. Reorders `values`.

@@ -115,7 +115,7 @@ fn the_session_has_failures_depths_and_studies() {
         (80, 75, 1, 2, 2, 3)
     );
     assert_eq!(a.scored.rmse_mm.n, 43);
-    assert!((2.0..12.0).contains(&a.scored.p95_mm.high.unwrap()));
+    assert!((1.0..3.0).contains(&a.scored.rmse_mm.value.unwrap()));
     assert!(a.findings.is_empty());
     let causes = a.warnings.iter().map(|w| &w.cause);
     assert!(

@@ -196,7 +196,7 @@ fn repetitions_may_be_made_in_any_order() {
             ("bit_rates", 5.5),
             ("reduction.curves[].rows[].press_bytes", 5.5),
             ("reduction.curves[].rows[].idle_bytes", 5.5),
-            ("indentation", 5.5),
+            ("indentation", 5.0),
             ("latency", 5.5),
         ],
     }

@@ -6,12 +6,9 @@ use skinrig_model::AnalysisSettings;
 use super::trials::{Outcome, Trial};
 use crate::bit_rates::in_bytes;
 use crate::exact;
-use crate::metrics::quantile;
+use crate::metrics::{quantile, tail};
 use crate::result::{Estimate, ReductionRow};
 use crate::seeded;
-
-/// Probability outside a 95 % interval on each side.
-const TAIL: f64 = 0.025;
 
 /// Data common to the rows of all curves.
 pub(super) struct CurveContext<'a> {
@@ -181,7 +178,8 @@ impl CurveContext<'_> {
         std::array::from_fn(|k| {
             let mut sampled: Vec<f64> = samples.iter().filter_map(|s| s[k]).collect();
             let mut end = |q: f64| quantile(&mut sampled, q);
-            let bootstrap = end(TAIL).zip(end(1.0 - TAIL));
+            let outside = tail(places.len());
+            let bootstrap = end(outside).zip(end(1.0 - outside));
             let ends = values[k].zip(bootstrap).map(|(value, ends)| match k {
                 RMSE | RATE => ends,
                 _ => exact::share(value, places.len(), ends),
