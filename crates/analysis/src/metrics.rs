@@ -1,8 +1,8 @@
 //! Localisation metrics: errors over the scored presses, with bootstrap intervals.
 //!
 //! Intervals are expanded percentile intervals (Hesterberg 2015) of a bootstrap that resamples *locations* with all their
-//! repetitions, because presses at one location share its systematic error. Shares of 0 and 1, which no resample changes, get exact binomial intervals
-//! over the locations.
+//! repetitions, because presses at one location share its systematic error. Shares of 0 and 1, which no resample changes, get
+//! exact binomial intervals over the locations. `tests/analysis/intervals` measures what they cover.
 
 use rayon::prelude::*;
 use skinrig_model::{Point2, SkinOutline, quantile as sorted_quantile};
@@ -19,6 +19,8 @@ const TAIL: f64 = 0.025;
 /// Fewest locations with an interval of the 95th percentile: with fewer, the largest error is below it with a chance above
 /// [`TAIL`], and so may be the whole interval.
 const P95_LOCATIONS: usize = 72;
+/// Fewest locations with failures for an interval of the RMSE with failures: fewer do not tell how many to expect.
+const FAILING_LOCATIONS: usize = 5;
 /// Index of the 95th percentile.
 const P95: usize = 6;
 /// Number of metrics with an interval, in the order of [`Values`].
@@ -203,13 +205,20 @@ pub fn penalised(
     let errors: Vec<(u32, f64)> = presses.iter().map(|p| (p.location, error(p))).collect();
     let failures = || presses.iter().filter(|p| !p.valid || p.found.is_none());
     let beyond = failures().filter(|p| length(p).is_some_and(|own| own > penalty));
+    let mut failing: Vec<u32> = failures().map(|p| p.location).collect();
+    failing.sort_unstable();
+    failing.dedup();
+    let mut rmse_mm = bootstrap_over_locations(&errors, resamples, seed, root_mean_square);
+    if failing.len() < FAILING_LOCATIONS {
+        (rmse_mm.low, rmse_mm.high) = (None, None);
+    }
     PenalisedRmse {
         penalty_mm: penalty,
         derived: stated_mm.is_none(),
         raised: penalty > stated,
         failures: failures().count() as u32,
         beyond_penalty: beyond.count() as u32,
-        rmse_mm: bootstrap_over_locations(&errors, resamples, seed, root_mean_square),
+        rmse_mm,
     }
 }
 
