@@ -1,8 +1,6 @@
 //! Calibration of the intervals of the metrics: how often sessions drawn from a population cover its true values, by kind of
 //! session. `README.md` has the table that the long battery prints.
 
-#![expect(clippy::print_stdout, reason = "the table of the README")]
-
 mod populations;
 
 use rayon::prelude::*;
