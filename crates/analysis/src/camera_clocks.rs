@@ -117,12 +117,14 @@ impl CameraClock {
     ) -> Result<Self, AnalysisError> {
         let k = camera.index();
         let base_clock = base.and_then(|b| b.clocks[k]);
-        let by_marks = |channel| fit_marks(&input.edges[k], channel, &input.marks);
-        let (marks, why) = match (base_clock, input.rig.trigger_channel.map(by_marks)) {
-            (Some(_), _) => (None, None),
-            (None, Some(Ok(fit))) => (Some(fit), None),
-            (None, Some(Err(why))) => (None, Some(why)),
-            (None, None) => (None, Some(MarksError::NoChannel)),
+        let by_marks = || {
+            let channel = input.rig.trigger_channel.ok_or(MarksError::NoChannel)?;
+            fit_marks(&input.edges[k], channel, &input.marks)
+        };
+        let (marks, why) = match base_clock.is_none().then(by_marks) {
+            Some(Ok(fit)) => (Some(fit), None),
+            Some(Err(why)) => (None, Some(why)),
+            None => (None, None),
         };
         let mut reading = Self {
             clock: base_clock.or(marks.as_ref().map(|m| m.fit)),

@@ -238,15 +238,15 @@ pub(crate) fn mean(values: &mut [f64]) -> Option<f64> {
     sums::mean(values.iter().copied())
 }
 
-/// Mean of all values, with the expanded percentile interval of a bootstrap over whole locations. Each value comes with its location,
-/// in any order.
+/// Mean of all values, with the expanded percentile interval of a bootstrap over whole locations. Each value comes with its
+/// location, in any order.
 #[must_use]
 pub fn mean_over_locations(values: &[(u32, f64)], resamples: u32, seed: u64) -> Estimate {
     bootstrap_over_locations(values, resamples, seed, mean)
 }
 
-/// `statistic` of all values, with the expanded percentile interval of a bootstrap over whole locations. Each value comes with its
-/// location, in any order; `statistic` may reorder its input.
+/// `statistic` of all values, with the expanded percentile interval of a bootstrap over whole locations. Each value comes
+/// with its location, in any order; `statistic` may reorder its input.
 pub(crate) fn bootstrap_over_locations(
     values: &[(u32, f64)],
     resamples: u32,

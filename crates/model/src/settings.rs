@@ -181,7 +181,7 @@ pub struct ReductionSettings {
     /// Thinning factors 1, 2, 4 ... up to 2 to this power; the paper's 10.
     #[setting(default = "12", max = 20)]
     pub max_power: u32,
-    /// Random seeds per factor and kind of thinning. Ten give intervals no narrower than five: they are over presses.
+    /// Random seeds per factor and kind of thinning. More do not narrow the intervals, which come from the presses.
     #[setting(default = "5", min = 1, max = 1000)]
     pub seeds: u32,
     /// Core threshold of DBSCAN at all factors; 0 takes that of the analysis. The public code: 1.

@@ -153,7 +153,7 @@ pub(crate) fn compare(expected: &Figures, found: &Figures, rules: Digits<'_>) ->
         };
         if common == f64::INFINITY {
             out.equal += 1;
-        } else if common < needed {
+        } else if common.is_nan() || common < needed {
             let text = |f: Option<&Figure>| match f {
                 Some(Figure::Number(n)) => format!("{n:?}"),
                 Some(Figure::Word(w)) => w.clone(),

@@ -8,7 +8,7 @@ use super::figures::{Figure, Figures, figures, kind};
 use super::{BASE, Relation, begins, number};
 
 /// Camera 1 becomes camera 2, with everything that belongs to it.
-pub(super) fn exchange_cameras(session: &mut Session) {
+fn exchange_cameras(session: &mut Session) {
     let input = &mut session.input;
     session.events.reverse();
     input.edges.reverse();
@@ -36,7 +36,7 @@ fn move_all(session: &mut Session, to: impl Fn(Point2) -> Point2) {
 }
 
 /// The mirror image at the x axis: columns run backwards.
-pub(super) fn mirror(session: &mut Session) {
+fn mirror(session: &mut Session) {
     move_all(session, |p| Point2::new(p.x_mm, -p.y_mm));
     for camera in &mut session.input.rig.nominal.cameras {
         camera.skew_deg = -camera.skew_deg;
@@ -134,7 +134,7 @@ fn rename(figure: &mut Figure) {
     }
 }
 
-pub(super) fn swapped(path: &mut String, figure: &mut Figure) {
+fn swapped(path: &mut String, figure: &mut Figure) {
     other_camera(path);
     if is_sine(path) {
         number(figure, |sine| -sine);
@@ -145,7 +145,7 @@ pub(super) fn swapped(path: &mut String, figure: &mut Figure) {
 }
 
 /// The figure in the mirror image.
-pub(super) fn mirrored(path: &mut String, figure: &mut Figure) {
+fn mirrored(path: &mut String, figure: &mut Figure) {
     let signs = [1.0, -1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0];
     let sign: f64 = parameters(path).iter().map(|i| signs[*i]).product();
     let signed = !path.ends_with(".len") && !path.contains("standard_errors");
@@ -202,19 +202,24 @@ fn a_mirror_image_has_mirrored_results() {
     .holds();
 }
 
-/// What the same skin would show to somebody below it.
+/// The same skin, seen from below: mirrored, with the cameras exchanged.
+pub(super) fn seen_from_below(session: &mut Session) {
+    mirror(session);
+    exchange_cameras(session);
+}
+
+/// A figure of the skin seen from below.
+pub(super) fn below(path: &mut String, figure: &mut Figure) {
+    mirrored(path, figure);
+    swapped(path, figure);
+}
+
 #[test]
 fn a_mirror_image_with_exchanged_cameras_has_mirrored_results() {
     Relation {
         name: "mirrored, cameras exchanged",
-        change: &|session| {
-            mirror(session);
-            exchange_cameras(session);
-        },
-        expect: &|path, figure| {
-            mirrored(path, figure);
-            swapped(path, figure);
-        },
+        change: &seen_from_below,
+        expect: &below,
         silent: &|kind| is_unordered(kind) || is_thinned(kind),
         digits: &[],
     }

@@ -5,7 +5,7 @@ use skinrig_model::{CentroidRule, Estimator, Locator, WindowAnchor};
 use super::base::Session;
 use super::events::flip_polarities;
 use super::figures::figures;
-use super::space::{exchange_cameras, is_thinned, is_unordered, mirror, mirrored, swapped};
+use super::space::{below, is_thinned, is_unordered, seen_from_below};
 use super::time::{SHIFTS_US, move_camera, shifted};
 use super::{BASE, Relation, begins};
 
@@ -85,14 +85,8 @@ fn every_kind_of_session_has_mirrored_results_in_the_mirror() {
         (variant.change)(&mut session);
         Relation {
             name: &format!("mirrored, cameras exchanged: {}", variant.name),
-            change: &|session| {
-                mirror(session);
-                exchange_cameras(session);
-            },
-            expect: &|path, figure| {
-                mirrored(path, figure);
-                swapped(path, figure);
-            },
+            change: &seen_from_below,
+            expect: &below,
             // The inside of a learnt locator: its positions and regions are compared. The words of findings name camera 1 first.
             silent: &|kind| {
                 let inside = ["locator.model.cameras", "locator.model.prior"];

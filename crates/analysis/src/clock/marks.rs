@@ -31,8 +31,7 @@ pub struct MarksFit {
 
 /// Fits a camera's clock from the edges on its trigger channel and the marks that were sent.
 ///
-/// Marks sent or seen several times (a repeated attempt sends the same name
-/// again) are matched by time after the others have given a first fit.
+/// Marks sent or seen several times (a repeated attempt sends the same name again) are matched by time after the others have given a first fit.
 ///
 /// # Errors
 /// [`MarksError`] if fewer than three marks match, if they are not on the line of a clock, or if their camera times are beyond

@@ -121,10 +121,13 @@ fn other_counts(a: &Analysis) -> Vec<String> {
             0 => String::new(),
             n => format!(", {n} of them as their own larger error"),
         };
+        let interval = match p.rmse_mm.low {
+            Some(_) => interval(&p.rmse_mm, 1.0, 2),
+            None => "(no interval: too few locations with failures)".to_owned(),
+        };
         format!(
-            "{} mm {} with {} failed {presses} counted as {} mm{beyond} (n = {})",
+            "{} mm {interval} with {} failed {presses} counted as {} mm{beyond} (n = {})",
             number(p.rmse_mm.value, 2),
-            interval(&p.rmse_mm, 1.0, 2),
             p.failures,
             number(Some(p.penalty_mm), 1),
             p.rmse_mm.n
