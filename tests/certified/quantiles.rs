@@ -1,18 +1,18 @@
-//! Quantiles, distributions, intervals, tests and bootstraps.
+//! Quantiles, distributions, intervals and tests.
 
 use serde_json::Value;
-use skinrig_analysis::distributions::{normal_quantile, student_cdf, student_quantile};
 use skinrig_analysis::metrics::{mean_over_locations, share_over_locations};
-use skinrig_compare::statistics::{
+use skinrig_model::quantile;
+use skinrig_statistics::distributions::{normal_quantile, student_cdf, student_quantile};
+use skinrig_statistics::{
     ComparisonError, ComparisonTarget, ImprovementDirection, Interval, Pairing, Sample, Settings,
     compare, estimate,
 };
-use skinrig_model::quantile;
 
 use crate::problem::{Problem, Solution, numbers};
 
-/// Draws of a bootstrap: enough that no limit of the problems is a matter of chance.
-const DRAWS: u32 = 20_000;
+/// Resamples, which intervals of so few locations do not use.
+const DRAWS: u32 = 2_000;
 
 pub(crate) fn solve(problem: &Problem) -> Solution {
     let inputs = &problem.inputs;
@@ -28,7 +28,7 @@ pub(crate) fn solve(problem: &Problem) -> Solution {
     if inputs.get("pairing").is_some() {
         return test(problem);
     }
-    if let Some(places) = inputs.get("bootstrap") {
+    if let Some(places) = inputs.get("by_place") {
         let places = places.as_array().unwrap().iter().map(numbers);
         let values: Vec<(u32, f64)> = (0u32..)
             .zip(places)

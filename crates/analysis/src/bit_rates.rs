@@ -2,7 +2,7 @@
 
 use skinrig_model::{PressRole, Verdict};
 
-use crate::metrics::{bootstrap_over_locations, mean};
+use crate::over_locations::rate_over_locations;
 use crate::result::{Analysis, BitRates, Estimate, PressResult, PressView};
 
 /// Mean data rates of both cameras together over the counting scored presses: in the press window, and in the idle time
@@ -20,7 +20,7 @@ pub fn bit_rates(analysis: &Analysis) -> Option<BitRates> {
         return None;
     }
     let estimate = |rates: &[(u32, f64)]| {
-        bootstrap_over_locations(rates, settings.bootstrap_resamples, settings.seed, mean)
+        rate_over_locations(rates, settings.bootstrap_resamples, settings.seed)
     };
     let press: Vec<(u32, f64)> = presses
         .iter()

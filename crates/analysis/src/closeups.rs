@@ -7,8 +7,8 @@ use crate::input::SessionInput;
 use crate::press_event_collector::RetentionPlan;
 use crate::press_events::{EventView, Retention};
 use crate::result::ClockFit;
-use crate::seeded;
 use crate::segment::Window;
+use skinrig_statistics::seeded;
 
 /// Scored presses with an image.
 const PICTURES: usize = 6;

@@ -20,7 +20,7 @@ use skinrig_model::{CmreSettings, Point2, PressRole, SkinOutline, Verdict};
 use skinrig_settings::Settings;
 
 use crate::error::AnalysisError;
-use crate::metrics::bootstrap_over_locations;
+use crate::metrics::mean_over_locations;
 use crate::result::{Analysis, Cmre, Estimate};
 
 /// Gain of the difference between the maps (public code).
@@ -49,12 +49,8 @@ pub fn cmre(analysis: &Analysis) -> Option<Cmre> {
             None => without_score += 1,
         }
     }
-    let percent: Estimate = bootstrap_over_locations(
-        &scores,
-        settings.bootstrap_resamples,
-        settings.seed,
-        crate::metrics::mean,
-    );
+    let percent: Estimate =
+        mean_over_locations(&scores, settings.bootstrap_resamples, settings.seed);
     Some(Cmre {
         settings: settings.cmre,
         cells: map.cells,

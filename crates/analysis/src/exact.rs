@@ -2,7 +2,7 @@
 //!
 //! Resampling outcomes that never (or always) happened gives an interval of zero width.
 
-use crate::distributions::poisson_interval;
+use skinrig_statistics::distributions::poisson_interval;
 
 /// Probability outside a 95 % interval on each side.
 const TAIL: f64 = 0.025;

@@ -124,8 +124,8 @@ impl Counts<'_> {
 mod tests {
     use super::*;
     use crate::result::ClockMethod;
-    use crate::seeded;
     use rand_xoshiro::rand_core::Rng as _;
+    use skinrig_statistics::seeded;
 
     const CLOCK: ClockFit = ClockFit {
         method: ClockMethod::TriggerMarks,

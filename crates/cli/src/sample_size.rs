@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde_json::json;
 use skinrig_analysis::Analysis;
-use skinrig_compare::statistics::Sample;
-use skinrig_compare::statistics::power::{self, MetricVariance, PowerPlan, Target};
 use skinrig_model::{HostDuration, PressRole, Verdict};
+use skinrig_statistics::Sample;
+use skinrig_statistics::power::{self, MetricVariance, PowerPlan, Target};
 use skinrig_text::{Column, Table};
 
 use crate::analysis_request::AnalysisRequest;
@@ -51,7 +51,7 @@ pub(crate) fn propose(
 }
 
 /// Error lengths of the scored presses, mm.
-fn errors(analysis: &Analysis) -> Result<Sample, skinrig_compare::statistics::SampleFault> {
+fn errors(analysis: &Analysis) -> Result<Sample, skinrig_statistics::SampleFault> {
     let scored = analysis
         .presses
         .iter()

@@ -10,7 +10,6 @@ mod locations;
 mod metrics;
 mod result;
 mod sequential;
-pub mod statistics;
 mod subject;
 mod table;
 

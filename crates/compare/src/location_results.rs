@@ -4,10 +4,10 @@ use serde::Serialize;
 use skinrig_model::Point2;
 
 use crate::locations::Locations;
-use crate::statistics::{
+use crate::subject::Subject;
+use skinrig_statistics::{
     ComparisonTarget, ImprovementDirection, Interval, Pairing, Sample, Settings, compare,
 };
-use crate::subject::Subject;
 
 /// Results of one skin at one location.
 #[derive(Debug, Clone, PartialEq, Serialize)]

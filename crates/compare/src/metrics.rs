@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::locations::{Attempt, Locations};
-use crate::statistics::{Count, ImprovementDirection, Position, Sample, SampleFault};
 use crate::subject::Subject;
+use skinrig_statistics::{Count, ImprovementDirection, Position, Sample, SampleFault};
 
 /// A compared metric.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -9,9 +9,9 @@ use crate::location_results::{Location, compare_locations};
 use crate::locations::Locations;
 use crate::metrics::Metric;
 use crate::sequential::{SequentialComparison, first_repetitions, look};
-use crate::statistics::{AlphaSpending, Pairing, Settings, Verdict};
 use crate::subject::{SessionFacts, Subject};
 use crate::table::{Margins, Row, table};
+use skinrig_statistics::{AlphaSpending, Pairing, Settings, Verdict};
 
 /// Options of a comparison.
 #[derive(Debug, Clone, Default)]

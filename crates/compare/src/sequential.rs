@@ -8,10 +8,10 @@ use skinrig_model::{PressRole, RepetitionId, Verdict as PressVerdict};
 
 use crate::locations::Locations;
 use crate::metrics::Metric;
-use crate::statistics::{
+use crate::subject::Subject;
+use skinrig_statistics::{
     AlphaSpending, ComparisonTarget, Interval, Outlook, Sample, Settings, Verdict, compare,
 };
-use crate::subject::Subject;
 
 /// One look at the data: the first repetitions of both skins, as many of each.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -4,11 +4,11 @@ use serde::Serialize;
 
 use crate::locations::Locations;
 use crate::metrics::{DisplayFormat, Metric};
-use crate::statistics::{
+use crate::subject::Subject;
+use skinrig_statistics::{
     AdjustedComparison, Comparison, ComparisonTarget, Interval, PairSelection, Sample, Settings,
     Verdict, compare_all, estimate,
 };
-use crate::subject::Subject;
 
 /// Equivalence margins per metric, in the unit of its values.
 pub type Margins = Vec<(Metric, f64)>;

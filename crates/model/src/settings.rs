@@ -475,7 +475,7 @@ pub struct AnalysisSettings {
     /// Limits of the alignment certificate: a session beyond one of them is invalid.
     #[setting(default)]
     pub alignment: AlignmentSettings,
-    /// Resamples of the bootstrap over locations; 0: no intervals.
+    /// Resamples of the bootstrap over locations; below 39: no intervals.
     #[setting(default = "2000", max = 1_000_000)]
     pub bootstrap_resamples: u32,
     /// Seed of the bootstrap.

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use skinrig_analysis::clock::{Line, Pair, fit_line};
-use skinrig_analysis::distributions::student_quantile;
 use skinrig_model::pulse::decode_marks;
 use skinrig_model::{BoxReport, CameraId, HostDuration, Label, RawChunk, TriggerEdge};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::suite::{Check, Measure};
+use skinrig_statistics::distributions::student_quantile;
 
 use super::trigger::{Edges, mark};
 use crate::bench::Bench;

@@ -95,21 +95,21 @@ fn measure(population: &Population, sessions: u64) -> [Counts; METRICS.len()] {
     })
 }
 
-/// A sample of the battery: few locations, where plain percentiles of a bootstrap covered 82 % to 91 %. An RMSE, whose errors are
-/// skewed, still has less than the nominal coverage.
+/// A sample of the battery: few locations, where percentiles of a bootstrap covered 82 % to 91 %.
 #[test]
 fn ten_locations_have_intervals_of_95_percent() {
     let found = measure(&POPULATIONS[2], 400);
     for (name, counts) in METRICS.iter().zip(found) {
-        let shares = ["located", "within 5 mm", "RMSE with failures"];
+        // Where hardly any press fails, shares have no spread and are cautious.
+        let cautious = ["located", "within 5 mm", "RMSE with failures"];
         if *name == "95th percentile" {
             assert_eq!(counts.all(), 0);
-        } else if !shares.contains(name) {
-            assert_eq!(counts.all(), 400, "{name}");
-            let coverage = counts.coverage();
-            let least = if name.starts_with("RMSE") { 0.86 } else { 0.91 };
-            assert!((least..=0.98).contains(&coverage), "{name}: {coverage}");
+            continue;
         }
+        assert_eq!(counts.all(), 400, "{name}");
+        let most = if cautious.contains(name) { 1.0 } else { 0.98 };
+        let coverage = counts.coverage();
+        assert!((0.91..=most).contains(&coverage), "{name}: {coverage}");
     }
 }
 
@@ -123,7 +123,8 @@ fn table_of_metrics() {
     for population in &POPULATIONS {
         let found = measure(population, SESSIONS);
         for (name, counts) in METRICS.iter().zip(found).filter(|(_, c)| c.all() >= 100) {
-            let least = if name.starts_with("RMSE") { 0.68 } else { 0.86 };
+            let outliers = name.starts_with("RMSE") && population.outlying > 0.0;
+            let least = if outliers { 0.76 } else { 0.88 };
             let coverage = counts.coverage();
             assert!(coverage >= least, "{}: {name}: {coverage}", population.name);
         }

@@ -90,7 +90,7 @@ fn settings(calibration: CalibrationModel, seed: u64) -> AnalysisSettings {
     AnalysisSettings {
         calibration,
         seed,
-        bootstrap_resamples: 20,
+        bootstrap_resamples: 39,
         ..AnalysisSettings::default()
     }
 }

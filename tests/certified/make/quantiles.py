@@ -1,12 +1,10 @@
-"""Quantiles, distributions, intervals, tests and bootstraps of few or equal values.
+"""Quantiles, distributions, intervals and tests of few or equal values.
 
-Method A: mpmath with incomplete beta and error functions; bootstraps by enumeration of all draws.
-Method B: fractions, integrals of densities by quadrature, closed forms; bootstraps by the multinomial distribution.
+Method A: mpmath with incomplete beta and error functions.
+Method B: fractions, integrals of densities by quadrature, closed forms.
 """
 
 from fractions import Fraction
-from itertools import product
-from math import comb, factorial
 
 from mpmath import mp, mpf
 
@@ -17,8 +15,8 @@ NAME = "quantiles"
 ABOUT = (
     "`values` with `q`: quantile with linear interpolation between order statistics at q (n - 1). `normal` and `student`: quantile "
     "at p, or probability at most t with df degrees of freedom. `mean`, `rms`: 95 % interval of Student's t over locations with "
-    "one value each (for the rms to first order). `shared`, `independent`: two-sided p value of b - a, paired or after Welch. "
-    "`bootstrap`: 2.5 % and 97.5 % quantiles of the mean over all equally likely draws of whole locations with replacement, "
+    "one value each (for the rms on the scale of its logarithm, to first order). `shared`, `independent`: two-sided p value of b - a, paired or after Welch. "
+    "`by_place`: the same for the mean of all values of locations that have several. "
     "`share` of trues among locations (exact binomial limits at 0 and 1), `score`: Wilson's limits of a share p at Student's t with "
     "n - 1 degrees of freedom, for p (1 - p) / s^2 trials, s the standard error of p over n locations; n trials for 0 and 1."
 )
@@ -145,6 +143,18 @@ def probability(name, level, about, t, df):
 T_TWO = {1: lambda p: mp.tan(mp.pi * (p - mpf(1) / 2)), 2: lambda p: (2 * p - 1) / mp.sqrt(2 * p * (1 - p))}
 
 
+def sum_of_exponential(x):
+    """exp(x) from its series at x / 2^20, squared twenty times."""
+    with mp.workdps(80):
+        small, term, total = x / 2**20, mpf(1), mpf(1)
+        for k in range(1, 30):
+            term *= small / k
+            total += term
+        for _ in range(20):
+            total *= total
+        return total
+
+
 def interval(name, level, about, kind, values):
     """Value and limits; A with mpmath, B with fractions and a closed form of Student's quantile where there is one."""
     problem = Problem(name, level, about, {kind: values})
@@ -158,7 +168,11 @@ def interval(name, level, about, kind, values):
         mean = mp.fsum(squares) / len(v)
         error = mp.sqrt(mp.fsum((x - mean) ** 2 for x in squares) / len(v) / df)
         value, slope = (mp.sqrt(mean), 1 / (2 * mp.sqrt(mean))) if kind == "rms" else (mean, 1)
-        return [value, value - t_one * error * slope, value + t_one * error * slope]
+        half = t_one * error * slope
+        if kind == "rms":
+            factor = mp.exp(half / value)
+            return [value, value / factor, value * factor]
+        return [value, value - half, value + half]
 
     exactly = [exact(v) ** (2 if kind == "rms" else 1) for v in values]
     n = len(values)
@@ -170,6 +184,8 @@ def interval(name, level, about, kind, values):
         error = error / (2 * value)
     half = t_two * number(error)
     two = [number(value), number(value) - half, number(value) + half]
+    if kind == "rms":
+        two[1:] = [number(value) * sum_of_exponential(sign * half / number(value)) for sign in (-1, 1)]
     one = limits([mpf(v) for v in values])
     conditions = relative_condition(limits, [mpf(v) for v in values])
     for k, quantity in enumerate(("value", "low", "high")):
@@ -212,40 +228,35 @@ def test(name, level, about, kind, a, b):
     return problem
 
 
-def bootstrap(name, level, about, places):
-    """Mean and percentile limits; `places`: values of each location."""
-    problem = Problem(name, level, about, {"bootstrap": places})
-    k = len(places)
+def by_place(name, level, about, places):
+    """Mean over presses with limits over locations; `places`: values of each location."""
+    problem = Problem(name, level, about, {"by_place": places})
+    k, n = len(places), sum(len(p) for p in places)
+    t_one = student_quantile(mpf(0.975), k - 1)
+    t_two = T_TWO[k - 1](mpf(0.975))
+    lengths = [len(p) for p in places]
+
+    def limits(values):
+        rest, groups = list(values), []
+        for length in lengths:
+            groups.append(rest[:length])
+            rest = rest[length:]
+        mean = mp.fsum(values) / n
+        error = mp.sqrt(mp.fsum((mp.fsum(g) - len(g) * mean) ** 2 for g in groups) * k / (k - 1)) / n
+        return [mean, mean - t_one * error, mean + t_one * error]
+
+    values = [mpf(v) for p in places for v in p]
+    one = limits(values)
+    # Sum of the squares of (S - N m) as moments of the sums S and numbers N of the locations.
     sums = [(sum(exact(v) for v in p), len(p)) for p in places]
-    # All draws in order.
-    means = sorted(
-        sum(s for s, _ in draw) / sum(n for _, n in draw) for draw in product(sums, repeat=k)
-    )
-    at = lambda q: means[min(int(q * len(means)), len(means) - 1)]
-    one = [sum(s for s, _ in sums) / sum(n for _, n in sums), at(Fraction(1, 40)), at(Fraction(39, 40))]
-    # Numbers of times that each location is drawn, with their probabilities.
-    chances = {}
-    for times in product(range(k + 1), repeat=k):
-        if sum(times) == k:
-            ways = factorial(k)
-            for c in times:
-                ways //= factorial(c)
-            total = mp.fsum(number(s) * c for (s, _), c in zip(sums, times))
-            mean = total / sum(n * c for (_, n), c in zip(sums, times))
-            key = mp.nstr(mean, 50)
-            chances[key] = (mean, chances.get(key, (mean, 0))[1] + ways)
-
-    def limit(q):
-        reached = 0
-        for mean, ways in sorted(chances.values()):
-            reached += ways
-            if mpf(reached) / k**k > q:
-                return mean
-
-    two = [mp.fsum(mpf(v) for p in places for v in p) / sum(n for _, n in sums), limit(mpf(1) / 40), limit(mpf(39) / 40)]
+    mean = sum(s for s, _ in sums) / n
+    squares = sum(s * s for s, _ in sums) - 2 * mean * sum(s * c for s, c in sums) + mean * mean * sum(c * c for _, c in sums)
+    half = t_two * number(rational.sqrt(squares * k / (k - 1))) / n
+    two = [number(mean), number(mean) - half, number(mean) + half]
+    spread = abs(half) > 0
+    conditions = relative_condition(limits, values) if spread else [mpf(1)] * 3
     for i, quantity in enumerate(("value", "low", "high")):
-        size = mp.fsum(abs(mpf(v)) for p in places for v in p) / sum(n for _, n in sums)
-        problem.answer(quantity, "1", one[i], two[i], size / abs(number(one[i])) if one[i] else size)
+        problem.answer(quantity, "1", one[i], two[i], conditions[i] + (1 if i else 0))
     return problem
 
 
@@ -340,10 +351,10 @@ def problems():
         test("far-above", "hard", "b far above a: the same p value", "shared", far, off),
         refused("no-spread", "The same difference at each location", "shared", [1.0, 2.0, 3.0], [1.5, 2.5, 3.5], "no spread"),
         refused("one-location", "One location", "shared", [1.0], [1.5], "too few"),
-        bootstrap("bootstrap-two", "easy", "Two locations", [[0.1], [0.3]]),
-        bootstrap("bootstrap-ties", "easy", "Three equal locations", [[0.1], [0.1], [0.1]]),
-        bootstrap("bootstrap-uneven", "average", "Two locations with one and three presses", [[1.25], [0.5, 0.75, 0.5]]),
-        bootstrap("bootstrap-three", "average", "Three locations, two of them tied", [[2.5], [2.5], [-1.0]]),
+        by_place("places-two", "easy", "Two locations", [[0.1], [0.3]]),
+        by_place("places-ties", "easy", "Three equal locations", [[0.1], [0.1], [0.1]]),
+        by_place("places-uneven", "average", "Two locations with one and three presses", [[1.25], [0.5, 0.75, 0.5]]),
+        by_place("places-three", "average", "Three locations, two of them tied", [[2.5], [2.5], [-1.0]]),
         share("share-all-of-two", "average", "All of two locations", 2, 2),
         share("share-none-of-nine", "average", "None of nine locations", 0, 9),
         score("score-half-of-two", "average", "One of two locations", 1, 2),

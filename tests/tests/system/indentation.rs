@@ -1,7 +1,7 @@
 //! Depth and force estimated on optically simulated skins: errors at unseen places, coverage of intervals, return to zero.
 
 use skinrig_analysis::result::{Analysis, Quantity};
-use skinrig_analysis::{SessionInput, analyze, seeded};
+use skinrig_analysis::{SessionInput, analyze};
 use skinrig_model::{
     AnalysisSettings, CameraId, CdEvent, HostTime, MarkKind, Point2, Point3, PressRole,
     RigGeometry, SimLevel,
@@ -10,6 +10,7 @@ use skinrig_planted::{Memory, PlantedPress, mark, press, timing};
 use skinrig_sim::SimConfig;
 use skinrig_sim::optical::OpticalModel;
 use skinrig_sim::scene::{GRID_NS, PixelModel, TipSample};
+use skinrig_statistics::seeded;
 
 /// Force per depth in the simulator, N/mm.
 const STIFFNESS: f64 = 0.6;

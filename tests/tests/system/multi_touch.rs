@@ -7,7 +7,7 @@ use skinrig_analysis::multi_touch::{
     Separation, Separator, SingleTouch, TouchEvent, TouchSight, TouchTimes,
 };
 use skinrig_analysis::result::Analysis;
-use skinrig_analysis::{SessionInput, analyze, seeded};
+use skinrig_analysis::{SessionInput, analyze};
 use skinrig_model::{
     AnalysisSettings, CameraId, CdEvent, HostTime, MarkKind, Point2, Point3, PressRole,
     RigGeometry, SimLevel, Skin,
@@ -16,6 +16,7 @@ use skinrig_planted::{Memory, PlantedPress, mark, press, timing};
 use skinrig_sim::SimConfig;
 use skinrig_sim::optical::SeveralTips;
 use skinrig_sim::scene::{FurtherTip, GRID_NS};
+use skinrig_statistics::seeded;
 
 const PERIOD_S: f64 = 2.5;
 const HOLD_S: f64 = 0.15;

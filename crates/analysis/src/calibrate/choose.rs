@@ -10,7 +10,7 @@ use super::paired::{CHOICE, Difference, Losses, Step, select_model};
 use super::parameters::{MODELS, parameter_count};
 use super::{Fit, different_places, error_lengths, largest_supported, threshold};
 use crate::input::SessionInput;
-use crate::metrics::{bootstrap_over_locations, root_mean_square as rms, spread_mm};
+use crate::metrics::{rms_over_locations, spread_mm};
 use crate::result::{
     CalibrationResult, Estimate, ModelComparison, ModelTest, PressResult, ThresholdChoice, Warning,
     WarningCause,
@@ -232,7 +232,7 @@ impl ModelCandidate {
             pairs.map(|(s, e)| (s.location, *e)).collect()
         });
         let rmse_mm: Estimate =
-            bootstrap_over_locations(&values, settings.bootstrap_resamples, settings.seed, rms);
+            rms_over_locations(&values, settings.bootstrap_resamples, settings.seed);
         ModelComparison {
             model: self.model,
             parameters: parameter_count(self.model) as u32,

@@ -7,8 +7,8 @@ use super::parameters::{Parameters, is_plausible, parameters_of, with_parameters
 use super::problem::Problem;
 use super::solver::minimise;
 use super::{best, error_lengths};
-use crate::seeded;
 use crate::sets::CalibrationPress;
+use skinrig_statistics::seeded;
 
 /// Number of folds; with fewer locations, each is a fold.
 const FOLDS: usize = 10;

@@ -25,7 +25,6 @@ use rayon::prelude::*;
 use skinrig_model::{CalibrationModel, StereoGeometry};
 
 use crate::result::CalibrationResult;
-use crate::seeded;
 use crate::sets::{CalibrationPress, CalibrationSet};
 pub use choose::{ModelChoice, choose};
 pub(crate) use choose::{SessionCalibration, calibrate_session, reject_presses};
@@ -38,6 +37,7 @@ pub(crate) use parameters::{SPREAD, parameters_of, with_parameters};
 pub(crate) use problem::StereoModel;
 use problem::{Measure, Problem};
 pub(crate) use refit::{Refit, covariance};
+use skinrig_statistics::seeded;
 use solver::{Descent, minimise, polish};
 pub(crate) use standard::standard_fit;
 

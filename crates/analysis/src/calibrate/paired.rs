@@ -6,7 +6,7 @@
 
 use super::crossval::mean_difference;
 use super::{MIN_BOUND_MM, RAYLEIGH_MEDIAN};
-use crate::distributions::student_quantile;
+use skinrig_statistics::distributions::student_quantile;
 
 /// Bound on errors in robust standard deviations of one coordinate. Four in a million normal errors exceed it.
 const BOUND_SIGMAS: f64 = 5.0;
@@ -156,7 +156,7 @@ pub(crate) fn select_model(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::seeded;
+    use skinrig_statistics::seeded;
 
     fn errors(seed: u64, n: usize, mm: f64) -> Vec<f64> {
         let mut rng = seeded::generator(seed, 0);

@@ -146,8 +146,8 @@ mod tests {
     use super::super::parameters::parameters_of;
     use super::super::problem::Measure;
     use super::*;
-    use crate::seeded;
     use crate::sets::CalibrationPress;
+    use skinrig_statistics::seeded;
 
     /// The same problem for a library's orthogonal (QR) solver.
     struct Reference<'a>(Problem<'a>, Parameters);

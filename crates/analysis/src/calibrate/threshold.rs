@@ -10,8 +10,8 @@
 use super::crossval::mean_difference;
 use crate::metrics::spread_mm;
 use crate::result::ThresholdChoice;
-use crate::seeded;
 use crate::sets::CalibrationPress;
+use skinrig_statistics::seeded;
 
 /// Largest share of calibration presses to reject; more indicates a broken session, not a threshold.
 const MAX_LEFT_OUT: f64 = 0.5;

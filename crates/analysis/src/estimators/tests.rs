@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use skinrig_model::{AnalysisSettings, CdEvent, CentroidRule, Estimator, Polarity, Precision};
 
 use super::*;
-use crate::seeded;
+use skinrig_statistics::seeded;
 
 const ROWS: (u16, u16) = (185, 360);
 const ALL: [(Estimator, Precision); 6] = [

@@ -2,8 +2,8 @@
 
 use skinrig_model::AnalysisSettings;
 
-use crate::metrics::{bootstrap_over_locations, mean, root_mean_square, share_over_locations};
-use crate::result::{Quantity, QuantityAtDepth, QuantityErrors, Ranged};
+use crate::metrics::{mean_over_locations, rms_over_locations, share_over_locations};
+use crate::result::{Estimate, Quantity, QuantityAtDepth, QuantityErrors, Ranged};
 
 /// A press with estimate and measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,14 +47,9 @@ pub(super) fn quantity(
 }
 
 fn errors(rows: &[Row], settings: &AnalysisSettings) -> QuantityErrors {
-    let numbers = |of: &dyn Fn(&Row) -> f64, statistic: fn(&mut [f64]) -> Option<f64>| {
+    let numbers = |of: &dyn Fn(&Row) -> f64, estimate: fn(&[(u32, f64)], u32, u64) -> Estimate| {
         let values: Vec<(u32, f64)> = rows.iter().map(|r| (r.location, of(r))).collect();
-        bootstrap_over_locations(
-            &values,
-            settings.bootstrap_resamples,
-            settings.seed,
-            statistic,
-        )
+        estimate(&values, settings.bootstrap_resamples, settings.seed)
     };
     let error = |r: &Row| r.estimate.value - r.measured;
     let each = rows.iter();
@@ -65,9 +60,9 @@ fn errors(rows: &[Row], settings: &AnalysisSettings) -> QuantityErrors {
         })
         .collect();
     QuantityErrors {
-        rmse: numbers(&error, root_mean_square),
-        bias: numbers(&error, mean),
-        relative_percent: numbers(&|r| 100.0 * error(r) / r.measured, root_mean_square),
+        rmse: numbers(&error, rms_over_locations),
+        bias: numbers(&error, mean_over_locations),
+        relative_percent: numbers(&|r| 100.0 * error(r) / r.measured, rms_over_locations),
         covered: share_over_locations(&inside, settings.bootstrap_resamples, settings.seed),
     }
 }

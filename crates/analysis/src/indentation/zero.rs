@@ -8,7 +8,7 @@ use skinrig_model::AnalysisSettings;
 
 use super::collector::PressPhases;
 use super::phases::AFTER;
-use crate::metrics::{bootstrap_over_locations, mean, root_mean_square};
+use crate::metrics::{mean_over_locations, rms_over_locations};
 use crate::result::ZeroReturn;
 
 /// Standard errors to the end of a 95 % interval.
@@ -57,10 +57,8 @@ pub(super) fn zero_return(
     rests: &[(u32, f64)],
     settings: &AnalysisSettings,
 ) -> ZeroReturn {
-    let estimate = |of: fn(&mut [f64]) -> Option<f64>| {
-        bootstrap_over_locations(rests, settings.bootstrap_resamples, settings.seed, of)
-    };
-    let mean_mm = estimate(mean);
+    let (resamples, seed) = (settings.bootstrap_resamples, settings.seed);
+    let mean_mm = mean_over_locations(rests, resamples, seed);
     let trend = trend(rests);
     let beyond = |low: f64, high: f64| low > ZeroReturn::LIMIT_MM || high < -ZeroReturn::LIMIT_MM;
     let drifts = mean_mm
@@ -71,7 +69,7 @@ pub(super) fn zero_return(
     ZeroReturn {
         after_s,
         mean_mm,
-        rms_mm: estimate(root_mean_square),
+        rms_mm: rms_over_locations(rests, resamples, seed),
         trend_mm: trend.map(|(mm, _)| mm),
         drifts,
     }

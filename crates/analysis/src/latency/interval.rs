@@ -1,5 +1,5 @@
-//! Estimates of a detector at one threshold, with bootstrap intervals over locations; exact intervals for false alarms, and
-//! where nothing or everything was detected.
+//! Estimates of a detector at one threshold, with expanded percentile intervals (Hesterberg 2015) over locations; exact
+//! intervals for false alarms, and where nothing or everything was detected.
 
 use rayon::prelude::*;
 
@@ -7,10 +7,12 @@ use super::sweep::OnsetStatistics;
 use crate::exact;
 use crate::metrics::quantile;
 use crate::result::Estimate;
-use crate::seeded;
+use skinrig_statistics::distributions::{normal_cdf, student_quantile};
+use skinrig_statistics::seeded;
 
 /// Probability outside a 95 % interval on each side.
 const TAIL: f64 = 0.025;
+
 /// Number of quantities with an interval, in the order of [`Figures`].
 const COUNT: usize = 6;
 /// (value, n) of each: detected share, width, median; 5th percentile, median and 95th percentile after contact.
@@ -80,7 +82,8 @@ impl Plan {
             let (value, n) = figures[k];
             let mut values: Vec<f64> = samples.iter().filter_map(|s| s[k].0).collect();
             let mut end = |q| quantile(&mut values, q);
-            let bootstrap = end(TAIL).zip(end(1.0 - TAIL));
+            let outside = tail(places.len());
+            let bootstrap = end(outside).zip(end(1.0 - outside));
             let ends = value.zip(bootstrap).map(|(value, ends)| match k {
                 DETECTED => exact::share(value, places.len(), ends),
                 _ => ends,
@@ -119,6 +122,14 @@ impl Plan {
             after(0.95),
         ]
     }
+}
+
+/// Probability outside the percentile interval of a bootstrap over so many locations on each side. Percentiles at
+/// [`TAIL`] are too narrow, as a normal interval is that ignores that its scale is estimated and divides by n instead of n - 1.
+fn tail(places: usize) -> f64 {
+    let n = places.max(2) as f64;
+    let wider = student_quantile(1.0 - TAIL, n - 1.0) * (n / (n - 1.0)).sqrt();
+    normal_cdf(-wider)
 }
 
 /// Without time at risk there is no rate, not even 0.

@@ -35,8 +35,8 @@ use crate::result::{
     Analysis, ClockFit, ClockMethod, ContactLatency, Latency, MapName, ReducedLatency,
     ThresholdRow, TrialBackground,
 };
-use crate::seeded;
 use crate::verdict;
+use skinrig_statistics::seeded;
 
 /// First random stream for thinning events; the bootstrap counts from 0.
 const THINNING: u64 = 1 << 40;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::seeded;
+use skinrig_statistics::seeded;
 
 /// Indices of the kept events out of `n` at factor `factor` (at least 1): n / factor of them, rounded, ties to even (public
 /// code), without replacement, ascending. Floyd's method (Bentley and Floyd 1987): one random number per kept event.

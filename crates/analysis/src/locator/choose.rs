@@ -10,7 +10,7 @@ use super::spread::SpreadFits;
 use super::{Features, FitError, FittedLocator};
 use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
 use crate::calibrate::{root_mean_square, select_model};
-use crate::metrics::{bootstrap_over_locations, root_mean_square as rms};
+use crate::metrics::rms_over_locations;
 use crate::result::{
     CalibrationResult, LocatorComparison, LocatorFallback, LocatorResult, LocatorTest, Warning,
     WarningCause,
@@ -186,7 +186,7 @@ impl<'a> Learner<'a> {
             let (resamples, seed) = (self.settings.bootstrap_resamples, self.settings.seed);
             LocatorComparison {
                 locator: candidate.method.locator(),
-                rmse_mm: bootstrap_over_locations(&pairs, resamples, seed, rms),
+                rmse_mm: rms_over_locations(&pairs, resamples, seed),
                 bounded_rmse_mm: errors.map(|e| losses.rms_mm(e)),
                 over_repetitions_mm: candidate.over_repetitions.as_deref().map(root_mean_square),
                 test: steps[i].map(|step| LocatorTest {

@@ -17,7 +17,8 @@ mod trials;
 use skinrig_model::PressRole;
 
 use crate::locator::FittedLocator;
-use crate::metrics::{bootstrap_over_locations, mean, quantile};
+use crate::metrics::quantile;
+use crate::over_locations::rate_over_locations;
 use crate::press_events::RetainedPresses;
 use crate::result::{Analysis, Reduction, ReductionCurve, Thinning};
 use crate::verdict;
@@ -56,12 +57,7 @@ pub fn study(analysis: &Analysis, retained: &RetainedPresses) -> Option<Reductio
     let course = curve::CurveContext {
         settings,
         pass_threshold_mm,
-        idle_events_per_s: bootstrap_over_locations(
-            &idle,
-            settings.bootstrap_resamples,
-            settings.seed,
-            mean,
-        ),
+        idle_events_per_s: rate_over_locations(&idle, settings.bootstrap_resamples, settings.seed),
     };
     Some(Reduction {
         eps_px: settings.eps_px,

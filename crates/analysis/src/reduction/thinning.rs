@@ -20,7 +20,7 @@ use crate::estimators::ColumnEstimate;
 use crate::locator::CameraFeatures;
 use crate::press_events::PackedEvent;
 use crate::result::Thinning;
-use crate::seeded;
+use skinrig_statistics::seeded;
 
 /// A view at one factor.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -7,7 +7,7 @@ use super::thinning::{ThinnedView, Thinner};
 use crate::locator::FittedLocator;
 use crate::press_events::{EventView, RetainedPress};
 use crate::result::{LocationOutcome, PressResult, Thinning};
-use crate::seeded;
+use skinrig_statistics::seeded;
 
 /// First random stream; no other part of an analysis uses these.
 const STREAMS: u64 = 1 << 63;

@@ -74,7 +74,7 @@ use crate::rule::Rule;
 /// end their search where the likelihood gains less than 0.001. Version 13: calibrations and located
 /// positions have at least nine correct digits where the problem is well posed. Version 14: so have held-out errors; the
 /// estimated depth treats ON and OFF alike, and intervals are wider for few locations.
-pub const ANALYSIS_VERSION: u32 = 14;
+pub const ANALYSIS_VERSION: u32 = 15;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -229,9 +229,10 @@ pub enum ClockMethod {
     EventRates,
 }
 
-/// A number with its 95 % interval and its n. Intervals come from a bootstrap, except where it has no spread: a share of 0
-/// or 1 has the exact binomial interval with the number of locations for n (0: up to 1 - 0.025^(1 / n); 1: from 0.025^(1 /
-/// n)), and a count over a time the exact Poisson interval.
+/// A number with its 95 % interval and its n. Intervals are over locations, as in comparisons of skins: studentised for means
+/// and mean squares (Student's t below 8 locations), score limits for shares, ranks for percentiles. A share of 0 or 1 has
+/// the exact binomial interval with the number of locations for n (0: up to 1 - 0.025^(1 / n); 1: from 0.025^(1 / n)), and a
+/// count over a time the exact Poisson interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Value; `None` if n is too small.
@@ -244,6 +245,19 @@ pub struct Estimate {
     pub n: u32,
 }
 
+impl Estimate {
+    /// A value from `n` presses and the ends of its interval; a value that does not exist has none.
+    pub(crate) fn new(value: Option<f64>, ends: Option<(f64, f64)>, n: usize) -> Self {
+        let ends = ends.filter(|_| value.is_some());
+        Self {
+            value,
+            low: ends.map(|e| e.0),
+            high: ends.map(|e| e.1),
+            n: n as u32,
+        }
+    }
+}
+
 /// Error at one depth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DepthResult {
@@ -253,7 +267,7 @@ pub struct DepthResult {
     pub rmse_mm: Estimate,
 }
 
-/// Localisation metrics, mm. Intervals come from a bootstrap over locations; for shares of 0 and 1 see [`Estimate`].
+/// Localisation metrics, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
     /// Root mean square Euclidean error.

@@ -42,15 +42,15 @@ pub struct ReductionCurve {
     pub rows: Vec<ReductionRow>,
 }
 
-/// Results at one factor. Values are means over seeds; intervals come from a bootstrap over locations of the seed means, so
-/// they include the spread between presses; for shares of 0 and 1 see [`Estimate`].
+/// Results at one factor, over all presses and seeds. Intervals are over locations, so they include the spread between
+/// presses; see [`Estimate`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReductionRow {
     /// k.
     pub factor: u32,
     /// Mean number of remaining events per press and camera.
     pub events_per_view: f64,
-    /// RMSE of the located presses, mm; n: presses located by at least one seed.
+    /// RMSE over the located presses of all seeds, mm; n: presses located by at least one seed.
     pub rmse_mm: Estimate,
     /// Lowest and highest RMSE of a single seed, mm.
     pub rmse_of_seeds_mm: Option<(f64, f64)>,

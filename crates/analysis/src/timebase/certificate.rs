@@ -9,9 +9,9 @@ use super::epoch_maps::{EpochMaps, pairs, trains};
 use super::held_out::coverage;
 use super::reading::Reading;
 use super::smooth::SmoothMap;
-use crate::distributions::student_quantile;
 use crate::metrics::quantile;
 use crate::result::{ClockMap, Knot, LineCounts, MapName};
+use skinrig_statistics::distributions::student_quantile;
 
 impl TimeBase {
     pub(super) fn counts(&self, k: usize) -> LineCounts {

@@ -1,7 +1,7 @@
 //! A time on one clock for a time on another, with its uncertainty.
 
 use super::smooth::Figure;
-use crate::distributions::{student_cdf, student_quantile};
+use skinrig_statistics::distributions::{student_cdf, student_quantile};
 
 /// A time on one clock, converted from another.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -75,7 +75,7 @@ pub(crate) struct CompareArgs {
     pub sequential: bool,
 
     /// Number of looks, declared before the first, which share alpha equally [default: unlimited; look k spends alpha / (k (k + 1))].
-    #[arg(long, value_name = "N", requires = "sequential", value_parser = clap::value_parser!(u32).range(1..=i64::from(skinrig_compare::statistics::MOST_LOOKS)))]
+    #[arg(long, value_name = "N", requires = "sequential", value_parser = clap::value_parser!(u32).range(1..=i64::from(skinrig_statistics::MOST_LOOKS)))]
     pub looks: Option<u32>,
 
     /// Compare this named variant (`skinrig analyze --name`) of every session [default: the official analyses].

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use skinrig_compare::statistics::AlphaSpending;
 use skinrig_compare::{ComparisonOptions, Metric};
 use skinrig_protocol::Limits;
+use skinrig_statistics::AlphaSpending;
 
 use crate::args::CompareArgs;
 use crate::exit::Failure;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::Interval;
 use crate::subject::Subject;
+use skinrig_statistics::Interval;
 
 /// Possible cause of a change in mean square error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

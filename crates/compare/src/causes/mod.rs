@@ -31,13 +31,13 @@ mod presses;
 use serde::Serialize;
 
 use crate::locations::Locations;
-use crate::statistics::Interval;
 use crate::subject::Subject;
 pub use cross_evaluation::CrossEvaluation;
 use cross_evaluation::cross_evaluate;
 use decompose::{FACTORS, contributions, draws};
 pub use factor::{Contribution, Factor, FactorMeasurement, Reanalysis};
 use presses::SkinPresses;
+use skinrig_statistics::Interval;
 
 /// Decomposition of the difference between a skin and the first one.
 #[derive(Debug, Clone, PartialEq, Serialize)]

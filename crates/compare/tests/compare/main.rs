@@ -1,4 +1,3 @@
-//! Tests of comparisons: their statistics, and causes of differences.
+//! Tests of comparisons: causes of differences.
 
 mod causes;
-mod statistics;

@@ -1,7 +1,7 @@
 //! Owns the looks of a sequential comparison: their table, and the sentence that concludes.
 
 use skinrig_compare::SequentialComparison;
-use skinrig_compare::statistics::{Interval, Outlook, Verdict};
+use skinrig_statistics::{Interval, Outlook, Verdict};
 use skinrig_text::Column as Cells;
 
 use super::text;

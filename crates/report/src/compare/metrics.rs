@@ -1,7 +1,7 @@
 //! Owns the tables of a comparison that page and terminal share.
 
-use skinrig_compare::statistics::Verdict;
 use skinrig_compare::{BaselineComparison, Comparison};
+use skinrig_statistics::Verdict;
 use skinrig_text::{Column as Cells, Style};
 
 use super::text;

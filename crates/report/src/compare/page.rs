@@ -1,7 +1,7 @@
 //! Owns the HTML page of a comparison: verdicts, comparability, metrics, maps, causes, sessions.
 
-use skinrig_compare::statistics::Verdict;
 use skinrig_compare::{Causes, Comparison, Difference, Severity};
+use skinrig_statistics::Verdict;
 
 use super::{figures, looks, metrics, tables, text};
 use crate::document::{Banner, Block, Document, Group, Note, Row, Section, Table, Text, soft};

@@ -1,7 +1,7 @@
 //! Formats the parts of a comparison: values with units, verdicts, required presses.
 
-use skinrig_compare::statistics::{Comparison, Interval, PressesNeeded, Verdict};
 use skinrig_compare::{BaselineComparison, Comparison as Result, Row, Skin};
+use skinrig_statistics::{Comparison, Interval, PressesNeeded, Verdict};
 
 use crate::format::{NONE, number};
 

@@ -87,8 +87,8 @@ pub fn reduction(input: &ReportInput<'_>) -> Option<Figure> {
 fn caption(study: &Reduction) -> String {
     let mut caption = format!(
         "Data reduction: localisation when only one event in k is kept, with one clustering setting at all factors \
-         (radius {} px, core threshold {} events). Values are means over {} seeds, bands 95 % intervals over locations \
-         (bootstrap; exact where a share is 0 or 100 %), {} presses. A press without an estimate fails in B, C and D. \
+         (radius {} px, core threshold {} events). Values are over {} seeds, bands 95 % intervals over locations \
+         (exact where a share is 0 or 100 %), {} presses. A press without an estimate fails in B, C and D. \
          The pass threshold is the 95th percentile of the errors at factor 1 ({} mm), so B begins at about 95 % by \
          construction; C requires an error of at most {} mm. Small figures above the plots: kB/s of both cameras \
          during a press.",

@@ -74,7 +74,7 @@ pub(super) fn reduction(a: &Analysis) -> Option<Table> {
         }
     }
     grid.note(format!(
-        "n = {} presses, means over {} seeds. Brackets: 95 % intervals from a bootstrap over locations, exact where a \
+        "n = {} presses, {} seeds. Brackets: 95 % intervals over locations, exact where a \
          share is 0 or 100 %. Events are per press and camera. Highlighted: the published factor.",
         study.presses, study.seeds
     ));

@@ -123,7 +123,7 @@ fn other_counts(a: &Analysis) -> Vec<String> {
         };
         let interval = match p.rmse_mm.low {
             Some(_) => interval(&p.rmse_mm, 1.0, 2),
-            None => "(no interval: too few locations with failures)".to_owned(),
+            None => "(no interval: too few locations)".to_owned(),
         };
         format!(
             "{} mm {interval} with {} failed {presses} counted as {} mm{beyond} (n = {})",

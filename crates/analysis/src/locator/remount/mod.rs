@@ -17,13 +17,13 @@ use super::field::Field;
 use super::fitted::FittedLocator;
 use super::regions::{LEVEL, size};
 use crate::calibrate::{PARAMETERS, covariance, rmse_mm, standard_fit, with_parameters};
-use crate::distributions::poisson_cdf;
 use crate::error::RecalibrationError;
 use crate::result::{
     Analysis, CalibrationResult, CameraMove, EarlierSession, LocatorModel, LocatorResult, Move,
     Recalibration, RemountPart, ThresholdChoice, Warning, WarningCause,
 };
 use crate::sets::{CalibrationPress, CalibrationSet};
+use skinrig_statistics::distributions::poisson_cdf;
 
 /// Fewest presses of a correction: of the three numbers that describe how the whole moved, each press reads two.
 const FEWEST: usize = 3;

@@ -1,6 +1,6 @@
 //! Points of a map, and values with their error.
 
-use crate::distributions::student_quantile;
+use skinrig_statistics::distributions::student_quantile;
 
 /// Simultaneous times on two clocks, µs, relative to their references.
 #[derive(Debug, Clone, Copy, PartialEq)]

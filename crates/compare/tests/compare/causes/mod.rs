@@ -8,10 +8,10 @@ mod planted;
 use planted::{PlantedCause, record};
 use skinrig_analysis::result::{CameraMove, EarlierSession, Move, Recalibration};
 use skinrig_compare::causes::causes;
-use skinrig_compare::statistics::Verdict;
 use skinrig_compare::{
     ComparisonOptions, Factor, Metric, Reanalysis, Severity, compare, differences,
 };
+use skinrig_statistics::Verdict;
 
 /// Planted causes, and the factor that must be reported.
 const PLANTS: [(PlantedCause, Factor); 6] = [

@@ -1,7 +1,7 @@
 //! Owns the figure of the causes of a change.
 
-use skinrig_compare::statistics::Interval;
 use skinrig_compare::{Causes, Comparison};
+use skinrig_statistics::Interval;
 
 use super::{foot, sign_class};
 use crate::format::number;

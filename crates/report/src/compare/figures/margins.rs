@@ -1,7 +1,7 @@
 //! Owns the figure of differences in units of their margins, which shows equivalence at a glance.
 
-use skinrig_compare::statistics::{Comparison as Compared, ImprovementDirection, Verdict};
 use skinrig_compare::{Comparison, Row};
+use skinrig_statistics::{Comparison as Compared, ImprovementDirection, Verdict};
 
 use super::{foot, sign_class};
 use crate::compare::text;

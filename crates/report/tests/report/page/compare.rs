@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use skinrig_analysis::tradeoff::{Choice, Cost, Region, Row, Tradeoff};
-use skinrig_compare::statistics::AlphaSpending;
 use skinrig_compare::{
     Comparison, ComparisonOptions, Metric, Session, SessionFacts, Subject, compare,
 };
@@ -12,6 +11,7 @@ use skinrig_model::{
 };
 use skinrig_report::compare as report;
 use skinrig_report::tradeoff::{self, Rows};
+use skinrig_statistics::AlphaSpending;
 
 use crate::support::{self, studies::estimate};
 

@@ -1,7 +1,7 @@
 //! Tests samples that cannot be compared: each reason has its own type and message, and no result
 //! is NaN.
 
-use skinrig_compare::statistics::{
+use skinrig_statistics::{
     ComparisonError, ComparisonTarget, Count, ImprovementDirection, Note, Pairing, Position,
     Sample, SampleFault, Settings, compare, estimate,
 };
@@ -136,7 +136,7 @@ fn a_median_among_misses_is_beyond_the_window() {
 fn unequal_repetitions_do_not_pass_for_a_difference() {
     // The same scatter, pressed 3 and 12 times: the std of 3 is too small on average.
     let sample = |repetitions: u32, seed: u64| {
-        let mut draws = crate::statistics::populations::Draws::new(seed, 3);
+        let mut draws = crate::populations::Draws::new(seed, 3);
         Sample::repeat_std((0..400 * repetitions).map(|i| {
             let at = Position {
                 series: 0,

@@ -2,20 +2,21 @@
 //! carry through.
 
 use proptest::prelude::*;
-use skinrig_compare::statistics::{
+use skinrig_statistics::{
     Comparison, ComparisonTarget, ImprovementDirection, Interval, Kind, Pairing, Position, Sample,
     Settings, Verdict, compare, estimate,
 };
 
-use crate::statistics::populations::{Draws, SimulatedPair};
+use crate::populations::{Draws, SimulatedPair};
 
-const KINDS: [Kind; 8] = [
+const KINDS: [Kind; 9] = [
     Kind::Mean,
     Kind::Rms,
     Kind::Taxels,
     Kind::RepeatStd,
     Kind::Share,
     Kind::Median,
+    Kind::Percentile95,
     Kind::Width,
     Kind::CountRate,
 ];

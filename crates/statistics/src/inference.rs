@@ -5,7 +5,7 @@ use super::comparison::Interval;
 use super::influence::{BOOTSTRAP_FROM, InferenceData, Measure, Ratio, correlation, error};
 use super::mover::{Limits, mover_limits};
 use super::question::{Pairing, Settings};
-use skinrig_analysis::distributions::{student_cdf, student_quantile};
+use crate::distributions::{student_cdf, student_quantile};
 
 /// An estimate with its error model.
 pub(super) struct Inference {
@@ -15,7 +15,11 @@ pub(super) struct Inference {
 
 enum IntervalMethod {
     /// Student's t times the standard error.
-    Student { error: f64, df: f64 },
+    Student {
+        error: f64,
+        df: f64,
+        scale: StudentScale,
+    },
     /// Bootstrap-t interval, never narrower than Student's t.
     BootstrapT {
         error: f64,
@@ -24,6 +28,36 @@ enum IntervalMethod {
     },
     /// Limits of the components, combined, at quantiles of Student's t.
     Limits { of: Box<LimitSource>, df: f64 },
+}
+
+/// Scale on which an error is taken to follow Student's t.
+#[derive(Clone, Copy)]
+enum StudentScale {
+    Value,
+    /// Logarithm of a value above 0, whose errors are skewed.
+    Logarithm,
+}
+
+impl StudentScale {
+    /// Ends of the interval of `half` standard errors on either side.
+    fn limits(self, value: f64, error: f64, half: f64) -> (f64, f64) {
+        match self {
+            Self::Value => (value - half * error, value + half * error),
+            Self::Logarithm => {
+                let factor = libm::exp(half * error / value);
+                (value / factor, value * factor)
+            }
+        }
+    }
+
+    /// Distance of the value above `border` in standard errors.
+    fn above(self, value: f64, error: f64, border: f64) -> f64 {
+        match self {
+            Self::Value => (value - border) / error,
+            Self::Logarithm if border > 0.0 => libm::log(value / border) * value / error,
+            Self::Logarithm => f64::INFINITY,
+        }
+    }
 }
 
 enum LimitSource {
@@ -39,7 +73,15 @@ impl Inference {
         let totals = of.totals();
         let (error, df) = (error(&totals), totals.len() as f64 - 1.0);
         let method = match of.shape.ratio() {
-            Some(_) if totals.len() < BOOTSTRAP_FROM => IntervalMethod::Student { error, df },
+            Some(ratio) if totals.len() < BOOTSTRAP_FROM => IntervalMethod::Student {
+                error,
+                df,
+                scale: if ratio.scale.is_positive() && of.value > 0.0 {
+                    StudentScale::Logarithm
+                } else {
+                    StudentScale::Value
+                },
+            },
             Some(ratio) => IntervalMethod::BootstrapT {
                 error,
                 df,
@@ -62,7 +104,8 @@ impl Inference {
         let method = match (a.shape.ratio(), b.shape.ratio()) {
             (Some(a), Some(b)) => {
                 if totals[0].len().min(totals[1].len()) < BOOTSTRAP_FROM {
-                    IntervalMethod::Student { error, df }
+                    let scale = StudentScale::Value;
+                    IntervalMethod::Student { error, df, scale }
                 } else {
                     let draws = draws(a, b, sign, settings);
                     IntervalMethod::BootstrapT { error, df, draws }
@@ -93,9 +136,9 @@ impl Inference {
     /// Two-sided interval with coverage 1 - `alpha`.
     pub(super) fn interval(&self, alpha: f64) -> Interval {
         let (low, high) = match &self.method {
-            IntervalMethod::Student { error, df } => {
-                let half = student_quantile(1.0 - 0.5 * alpha, *df) * error;
-                (self.value - half, self.value + half)
+            IntervalMethod::Student { error, df, scale } => {
+                let half = student_quantile(1.0 - 0.5 * alpha, *df);
+                scale.limits(self.value, *error, half)
             }
             IntervalMethod::BootstrapT { error, df, draws } => {
                 let t = student_quantile(1.0 - 0.5 * alpha, *df);
@@ -108,8 +151,8 @@ impl Inference {
                 );
                 (self.value - most * error, self.value - least * error)
             }
-            IntervalMethod::Limits { df, .. } => {
-                self.limits(student_quantile(1.0 - 0.5 * alpha, *df))
+            IntervalMethod::Limits { of, df } => {
+                of.limits(self.value, student_quantile(1.0 - 0.5 * alpha, *df))
             }
         };
         let finite = |v: f64| v.is_finite().then_some(v);
@@ -123,8 +166,8 @@ impl Inference {
     /// One-sided p value against `truth <= border`: a lower tail, which keeps its digits however small it is.
     pub(crate) fn p_above(&self, border: f64) -> f64 {
         match &self.method {
-            IntervalMethod::Student { error, df } => {
-                student_cdf((border - self.value) / error, *df)
+            IntervalMethod::Student { error, df, scale } => {
+                student_cdf(-scale.above(self.value, *error, border), *df)
             }
             IntervalMethod::BootstrapT { error, df, draws } => {
                 let t = (self.value - border) / error;
@@ -132,17 +175,15 @@ impl Inference {
                 let drawn = (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0);
                 drawn.max(student_cdf(-t, *df))
             }
-            IntervalMethod::Limits { df, .. } => {
-                student_cdf(-self.standard_errors_above(border), *df)
-            }
+            IntervalMethod::Limits { of, df } => student_cdf(-of.above(self.value, border), *df),
         }
     }
 
     /// One-sided p value against `truth >= border`.
     pub(crate) fn p_below(&self, border: f64) -> f64 {
         match &self.method {
-            IntervalMethod::Student { error, df } => {
-                student_cdf((self.value - border) / error, *df)
+            IntervalMethod::Student { error, df, scale } => {
+                student_cdf(scale.above(self.value, *error, border), *df)
             }
             IntervalMethod::BootstrapT { error, df, draws } => {
                 let t = (self.value - border) / error;
@@ -150,33 +191,29 @@ impl Inference {
                 let drawn = (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0);
                 drawn.max(student_cdf(t, *df))
             }
-            IntervalMethod::Limits { df, .. } => {
-                student_cdf(self.standard_errors_above(border), *df)
+            IntervalMethod::Limits { of, df } => student_cdf(of.above(self.value, border), *df),
+        }
+    }
+}
+
+impl LimitSource {
+    /// Limits at `c` standard errors about `value`.
+    fn limits(&self, value: f64, c: f64) -> (f64, f64) {
+        match self {
+            Self::Single(limits) => limits.at(c),
+            Self::Difference([a, b], together, least) => {
+                let (low, high) = mover_limits((a.0, a.1.at(c)), (b.0, b.1.at(c)), *together);
+                let half = c * least;
+                (low.min(value - half), high.max(value + half))
             }
         }
     }
 
-    fn limits(&self, c: f64) -> (f64, f64) {
-        match &self.method {
-            IntervalMethod::Limits { of, .. } => match of.as_ref() {
-                LimitSource::Single(limits) => limits.at(c),
-                LimitSource::Difference([a, b], together, least) => {
-                    let (low, high) = mover_limits((a.0, a.1.at(c)), (b.0, b.1.at(c)), *together);
-                    let half = c * least;
-                    (low.min(self.value - half), high.max(self.value + half))
-                }
-            },
-            IntervalMethod::Student { error, .. } | IntervalMethod::BootstrapT { error, .. } => {
-                (self.value - c * error, self.value + c * error)
-            }
-        }
-    }
-
-    /// Signed distance of the value above `border`, in standard errors, by bisection on the limits.
-    fn standard_errors_above(&self, border: f64) -> f64 {
-        let above = border <= self.value;
+    /// Signed distance of `value` above `border`, in standard errors, by bisection on the limits.
+    fn above(&self, value: f64, border: f64) -> f64 {
+        let above = border <= value;
         let passed = |c: f64| {
-            let (low, high) = self.limits(c);
+            let (low, high) = self.limits(value, c);
             if above { low <= border } else { high >= border }
         };
         let (mut near, mut far) = (0.0, 1.0);

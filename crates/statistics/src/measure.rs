@@ -30,12 +30,12 @@ pub(super) fn measure(
             found
         }
         Data::RepeatStd(c) => spread::repeat_std(c, estimator, &keep),
-        Data::Share(c) => {
+        Data::Share(times, c) => {
             let share = ratio(c, &keep, RatioTransform::Same, |v| {
                 (f64::from(u8::from(*v)), 1.0)
             });
             share.map(|m| Measure {
-                shape: InferenceData::Share(m.presses()),
+                shape: InferenceData::Share(m.presses() / times),
                 ..m
             })
         }
@@ -56,7 +56,7 @@ pub(super) fn measure(
                 ..m
             })
         }
-        Data::Median(c) => return quantiles::quantile(c, &keep, 0.5, side),
+        Data::Quantile(q, c) => return quantiles::quantile(c, &keep, *q, side),
         Data::Width(c) => return quantiles::width(c, &keep, side),
     };
     found.ok_or(empty)

@@ -1,11 +1,11 @@
 //! Tests comparisons of several prototypes at once.
 
-use skinrig_compare::statistics::{
+use skinrig_statistics::{
     ComparisonError, ComparisonTarget, ImprovementDirection, Pair, PairSelection, Sample, Settings,
     Verdict, compare_all,
 };
 
-use crate::statistics::populations::Draws;
+use crate::populations::Draws;
 
 const QUESTION: ComparisonTarget = ComparisonTarget {
     better: ImprovementDirection::Lower,

@@ -75,6 +75,11 @@ pub(super) enum RatioTransform {
 }
 
 impl RatioTransform {
+    /// True if the metric is never below 0.
+    pub(super) const fn is_positive(self) -> bool {
+        matches!(self, Self::Root | Self::Circles(_))
+    }
+
     /// Metric and its derivative with respect to the ratio; the derivative is 0 at the end of the range.
     pub(super) fn of(self, ratio: f64) -> (f64, f64) {
         match self {

@@ -1,13 +1,13 @@
 //! Tests that proposed designs have the requested power.
 
-use skinrig_compare::statistics::power::{Target, measure, plan};
-use skinrig_compare::statistics::{
+use skinrig_statistics::power::{Target, measure, plan};
+use skinrig_statistics::{
     ComparisonError, ComparisonTarget, ImprovementDirection, Kind, PressesNeeded, Sample, Settings,
     Verdict, compare,
 };
 
-use crate::statistics::levels::Trial;
-use crate::statistics::populations::{Draws, NOISE, OWN, SHARED, SimulatedPair};
+use crate::levels::Trial;
+use crate::populations::{Draws, NOISE, OWN, SHARED, SimulatedPair};
 
 /// A session with enough locations to know its variances.
 fn pilot(kind: Kind) -> Sample {

@@ -1,4 +1,4 @@
-//! Statistics for comparing skins: intervals, tests, verdicts and sample sizes, with locations as clusters.
+//! Statistics of skins: intervals, tests, verdicts and sample sizes, with locations as clusters; distributions, seeded draws.
 //!
 //! Presses at one location share an error and are not independent, so everything here resamples or counts whole locations.
 //! `docs/explanation/comparison.md` explains which interval and test serves which kind of metric, and how they perform on
@@ -23,7 +23,9 @@ mod bootstrap;
 mod compare;
 mod comparison;
 mod components;
+pub mod distributions;
 mod error;
+mod failures;
 mod family;
 mod inference;
 mod influence;
@@ -37,6 +39,7 @@ mod quantiles;
 mod question;
 mod sample;
 mod scores;
+pub mod seeded;
 mod spending;
 mod spread;
 
@@ -45,6 +48,7 @@ pub use comparison::{
     Comparison, Components, Design, Interval, Note, PressesNeeded, RequiredDesign, Tost, Verdict,
 };
 pub use error::{ComparisonError, Side};
+pub use failures::rms_with_failures;
 pub use family::{AdjustedComparison, Pair, PairSelection, compare_all};
 pub use question::{ComparisonTarget, ImprovementDirection, Pairing, Settings};
 pub use sample::{Count, Kind, Position, Sample, SampleFault};

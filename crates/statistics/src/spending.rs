@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::comparison::{Comparison, Verdict};
 use super::question::Settings;
-use skinrig_analysis::distributions::student_quantile;
+use crate::distributions::student_quantile;
 
 /// Most looks. Further ones would need millions of draws each.
 pub const MOST_LOOKS: u32 = 100;

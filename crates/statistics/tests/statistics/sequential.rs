@@ -1,12 +1,12 @@
 //! Sequential comparisons of simulated skins: false decisions, coverage at the stop, early stops, and what to expect.
 #![expect(clippy::print_stdout, reason = "shows the rates that docs state")]
 
-use skinrig_compare::statistics::{
+use skinrig_statistics::{
     AlphaSpending, Comparison, ComparisonTarget, ImprovementDirection, Kind, Outlook, Settings,
     Verdict, compare,
 };
 
-use crate::statistics::populations::{Draws, SimulatedPair};
+use crate::populations::{Draws, SimulatedPair};
 
 const UNPLANNED: AlphaSpending = AlphaSpending {
     planned_looks: None,

@@ -5,7 +5,7 @@
 //! for the tens of locations on a skin. The standard error of a draw comes from the same sums as the draw, so a draw costs
 //! one pass over the locations.
 
-use skinrig_analysis::seeded;
+use crate::seeded;
 
 use super::influence::Ratio;
 

@@ -21,7 +21,16 @@ pub fn estimate(sample: &Sample, settings: &Settings) -> Result<Interval, Compar
     if locations < 2 {
         return Err(ComparisonError::TooFewLocations { locations });
     }
-    Ok(Inference::alone(&of, settings).interval(settings.alpha))
+    Ok(alone(sample, &of, settings))
+}
+
+/// Interval of one sample; a value that is never below 0 has no limit below 0.
+fn alone(sample: &Sample, of: &Measure, settings: &Settings) -> Interval {
+    let mut interval = Inference::alone(of, settings).interval(settings.alpha);
+    if sample.is_positive() {
+        interval.low = interval.low.map(|low| low.max(0.0));
+    }
+    interval
 }
 
 /// Compares B with A. Differences are B - A.
@@ -71,8 +80,8 @@ pub fn compare(
     let components = components::of(&of, settings.pairing);
     Ok(Comparison {
         kind: a.kind(),
-        a: Inference::alone(&of[0], settings).interval(settings.alpha),
-        b: Inference::alone(&of[1], settings).interval(settings.alpha),
+        a: alone(a, &of[0], settings),
+        b: alone(b, &of[1], settings),
         difference: whole,
         p_difference,
         tost,

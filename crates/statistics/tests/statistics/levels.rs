@@ -1,8 +1,8 @@
 //! Coverage of intervals and error rates of tests on simulated skins; treating presses as independent fails the same checks.
 
-use skinrig_compare::statistics::{ComparisonTarget, Kind, Pairing, Settings, Verdict, compare};
+use skinrig_statistics::{ComparisonTarget, Kind, Pairing, Settings, Verdict, compare};
 
-use crate::statistics::populations::{Draws, SimulatedPair};
+use crate::populations::{Draws, SimulatedPair};
 
 /// Shares among the populations that could be compared.
 #[derive(Debug, Default, Clone, Copy)]
@@ -176,6 +176,14 @@ fn of_a_median_latency() {
 }
 
 #[test]
+fn of_a_95th_percentile() {
+    levels_hold(Trial::new(SimulatedPair {
+        locations: 100,
+        ..SimulatedPair::new(Kind::Percentile95)
+    }));
+}
+
+#[test]
 fn of_the_width_of_latencies() {
     levels_hold(Trial::new(SimulatedPair {
         locations: 40,
@@ -201,7 +209,7 @@ fn of_a_rate_of_hardly_any_counts() {
 
 /// The table of `docs/explanation/comparison.md`.
 #[test]
-#[ignore = "takes minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-compare statistics -- --ignored --nocapture"]
+#[ignore = "takes minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-statistics -- --ignored --nocapture"]
 fn table_of_levels() {
     println!(
         "| metric | locations | covered, no difference | covered | type I, differ | type I, equivalent | naive covered | naive type I |"

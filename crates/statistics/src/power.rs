@@ -6,7 +6,7 @@ use super::error::{ComparisonError, Side};
 use super::measure::measure as measure_sample;
 use super::sample::Sample;
 use super::spread::RepeatEstimator;
-use skinrig_analysis::distributions::student_quantile;
+use crate::distributions::student_quantile;
 
 /// Variance components of one skin's metric. With `k` locations pressed `r` times each, the value has variance `between / k
 /// + within / (k r)`.

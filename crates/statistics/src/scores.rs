@@ -68,7 +68,7 @@ mod tests {
         let totals: Vec<f64> = (0..10)
             .map(|i| if i % 2 == 0 { 0.05 } else { -0.05 })
             .collect();
-        let worth = effective(0.5, 50.0, super::super::influence::error(&totals), 10);
+        let worth = effective(0.5, 50.0, crate::influence::error(&totals), 10);
         assert!((worth - 9.0).abs() < 1e-9, "{worth}");
         assert_eq!(effective(1.0, 50.0, 0.0, 10), 10.0);
         assert_eq!(effective(0.5, 50.0, 0.0, 10), 50.0);

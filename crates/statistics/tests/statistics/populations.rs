@@ -1,7 +1,7 @@
 //! Simulates skins: locations with their own errors, repetitions with noise, and known true values.
 
-use skinrig_analysis::seeded;
-use skinrig_compare::statistics::{Count, ImprovementDirection, Kind, Position, Sample};
+use skinrig_statistics::seeded;
+use skinrig_statistics::{Count, ImprovementDirection, Kind, Position, Sample};
 
 /// Seeded random numbers.
 pub(crate) struct Draws(Box<dyn FnMut() -> f64>);
@@ -194,6 +194,10 @@ impl SimulatedPair {
             Kind::Taxels => Sample::taxels(AREA_MM2, each(&length)).unwrap(),
             Kind::Share => Sample::share(presses.iter().map(|p| (key(p), x(p) - p.place[1] < 3.0))),
             Kind::Median => Sample::median(presses.iter().map(|p| (key(p), time(p)))).unwrap(),
+            Kind::Percentile95 => {
+                Sample::percentile_95(each(&|p| 20.0 + shift + p.place[0] + NOISE * p.noise[0]))
+                    .unwrap()
+            }
             Kind::Width => Sample::width(presses.iter().map(|p| (key(p), time(p)))).unwrap(),
             Kind::RepeatStd => Sample::repeat_std(presses.iter().map(|p| {
                 // Some locations are noisier than others.
@@ -227,6 +231,7 @@ impl SimulatedPair {
                 Kind::Taxels => AREA_MM2 / (std::f64::consts::PI * square),
                 Kind::Share => normal((2.0 - shift) / (press + place).sqrt()),
                 Kind::Median => 20.0 + shift + rank(0.5),
+                Kind::Percentile95 => 20.0 + shift + press.sqrt() * quantile(0.95),
                 Kind::Width => (1.0 + shift) * (rank(0.95) - rank(0.05)),
                 Kind::RepeatStd => {
                     let free = f64::from(self.repetitions - 1);

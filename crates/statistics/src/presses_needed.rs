@@ -3,7 +3,7 @@
 use super::comparison::{Components, PressesNeeded, RequiredDesign, Verdict, direction};
 use super::influence::Measure;
 use super::question::{ComparisonTarget, ImprovementDirection, Settings};
-use skinrig_analysis::distributions::student_quantile;
+use crate::distributions::student_quantile;
 
 /// Upper limit of the search for locations.
 const MAX_LOCATIONS: u32 = 100_000;

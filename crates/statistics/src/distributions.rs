@@ -2,7 +2,7 @@
 
 /// P(Z <= z) of the standard normal distribution.
 #[must_use]
-pub(crate) fn normal_cdf(z: f64) -> f64 {
+pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
@@ -58,7 +58,7 @@ fn invert(p: f64, cdf: impl Fn(f64) -> f64) -> f64 {
 
 /// P(X <= k) of a Poisson variable with this mean (at least 0): terms summed from the largest down.
 #[must_use]
-pub(crate) fn poisson_cdf(k: u64, mean: f64) -> f64 {
+pub fn poisson_cdf(k: u64, mean: f64) -> f64 {
     if mean <= 0.0 {
         return 1.0;
     }
@@ -72,7 +72,7 @@ pub(crate) fn poisson_cdf(k: u64, mean: f64) -> f64 {
 /// Exact two-sided interval of a Poisson mean for an observed `count` (Garwood 1936): below its lower end `count` or more,
 /// above its upper end `count` or fewer occur with a probability below `tail`.
 #[must_use]
-pub(crate) fn poisson_interval(count: u64, tail: f64) -> (f64, f64) {
+pub fn poisson_interval(count: u64, tail: f64) -> (f64, f64) {
     let spread = 10.0 * (count as f64 + 25.0).sqrt();
     let solve = |is_above: &dyn Fn(f64) -> bool| {
         let (mut low, mut high) = (0.0, count as f64 + spread);

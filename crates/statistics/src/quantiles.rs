@@ -9,7 +9,7 @@ use super::influence::{InferenceData, Measure, ValuesByLocation, correlation, er
 use super::percentile::{Percentile, between};
 use super::sample::{Clusters, late};
 use super::scores;
-use skinrig_analysis::distributions::normal_quantile;
+use crate::distributions::normal_quantile;
 
 /// Value at rank `q` of sorted values (type 7 of Hyndman and Fan 1996). Infinite values are misses: a rank among them is
 /// infinite, where [`skinrig_model::quantile()`] is not a number.

@@ -21,6 +21,8 @@ pub enum Kind {
     Share,
     /// Median of times; a miss is later than every time.
     Median,
+    /// 95th percentile; a miss is later than every time.
+    Percentile95,
     /// 95th minus 5th percentile of times; a miss is later than every time.
     Width,
     /// Counts per unit of exposure: false alarms per second.
@@ -88,8 +90,10 @@ pub(super) enum Data {
     Rms(Clusters<f64>),
     Taxels(f64, Clusters<f64>),
     RepeatStd(Clusters<Position>),
-    Share(Clusters<bool>),
-    Median(Clusters<Option<f64>>),
+    /// Outcomes of trials, each of which was repeated so often on the same data.
+    Share(u32, Clusters<bool>),
+    /// Quantile of this rank.
+    Quantile(f64, Clusters<Option<f64>>),
     Width(Clusters<Option<f64>>),
     CountRate(Clusters<Count>),
 }
@@ -100,8 +104,8 @@ impl Data {
         match self {
             Self::Mean(c) | Self::Rms(c) | Self::Taxels(_, c) => c.keys().copied().collect(),
             Self::RepeatStd(c) => c.keys().copied().collect(),
-            Self::Share(c) => c.keys().copied().collect(),
-            Self::Median(c) | Self::Width(c) => c.keys().copied().collect(),
+            Self::Share(_, c) => c.keys().copied().collect(),
+            Self::Quantile(_, c) | Self::Width(c) => c.keys().copied().collect(),
             Self::CountRate(c) => c.keys().copied().collect(),
         }
     }
@@ -173,13 +177,20 @@ impl Sample {
     /// Sample for a success rate, from (location, success) of each attempted press.
     #[must_use]
     pub fn share(trials: impl IntoIterator<Item = (u32, bool)>) -> Self {
+        Self::share_of_repeated(trials, 1)
+    }
+
+    /// The same if each trial was repeated `times` (at least once) on the same data, so that only one in `times` may be
+    /// independent.
+    #[must_use]
+    pub fn share_of_repeated(trials: impl IntoIterator<Item = (u32, bool)>, times: u32) -> Self {
         let mut clusters: Clusters<bool> = BTreeMap::new();
         for (location, success) in trials {
             clusters.entry(location).or_default().push(success);
         }
         clusters.values_mut().for_each(|v| v.sort_unstable());
         Self {
-            data: Data::Share(clusters),
+            data: Data::Share(times.max(1), clusters),
         }
     }
 
@@ -191,7 +202,20 @@ impl Sample {
         times: impl IntoIterator<Item = (u32, Option<f64>)>,
     ) -> Result<Self, SampleFault> {
         censored(times).map(|v| Self {
-            data: Data::Median(v),
+            data: Data::Quantile(0.5, v),
+        })
+    }
+
+    /// Sample for a 95th percentile, from (location, value) of each press.
+    ///
+    /// # Errors
+    /// [`SampleFault::NotFinite`].
+    pub fn percentile_95(
+        values: impl IntoIterator<Item = (u32, f64)>,
+    ) -> Result<Self, SampleFault> {
+        let values = values.into_iter().map(|(location, v)| (location, Some(v)));
+        censored(values).map(|v| Self {
+            data: Data::Quantile(0.95, v),
         })
     }
 
@@ -237,11 +261,20 @@ impl Sample {
             Data::Rms(_) => Kind::Rms,
             Data::Taxels(..) => Kind::Taxels,
             Data::RepeatStd(_) => Kind::RepeatStd,
-            Data::Share(_) => Kind::Share,
-            Data::Median(_) => Kind::Median,
+            Data::Share(..) => Kind::Share,
+            Data::Quantile(q, _) if q > 0.5 => Kind::Percentile95,
+            Data::Quantile(..) => Kind::Median,
             Data::Width(_) => Kind::Width,
             Data::CountRate(_) => Kind::CountRate,
         }
+    }
+
+    /// True if values of this kind are never below 0.
+    pub(super) const fn is_positive(&self) -> bool {
+        matches!(
+            self.data,
+            Data::Rms(_) | Data::Taxels(..) | Data::RepeatStd(_) | Data::CountRate(_)
+        )
     }
 
     pub(super) const fn data(&self) -> &Data {
