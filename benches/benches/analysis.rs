@@ -6,6 +6,7 @@ use skinrig_analysis::calibrate::{calibrate, choose};
 use skinrig_analysis::clock::{PressSpan, align_by_rates, fit_rates};
 use skinrig_analysis::dbscan::Dbscan;
 use skinrig_analysis::grid::PixelGrid;
+use skinrig_analysis::locator::FittedLocator;
 use skinrig_analysis::metrics::{Exclusions, metrics};
 use skinrig_analysis::press_events::Retention;
 use skinrig_analysis::rates::RateHistogram;
@@ -299,9 +300,10 @@ fn reductions() {
         events / (2 * kept.presses.len()),
     );
     let (mut dbscan, mut grid) = (Dbscan::new(10.0, 10), PixelGrid::new((185, 360)));
+    let locator = FittedLocator::of(&done).expect("a locator");
     let mut table = Table::new("data reduction of one repetition", "study", &method);
     table.row("the whole study", 1.0, || {
-        std::hint::black_box(reduction::study(&done, &kept));
+        std::hint::black_box(reduction::study(&done, &locator, &kept));
     });
     table.baseline("each press once, one core", 1.0, || {
         for view in kept.presses.iter().flat_map(|p| &p.views) {

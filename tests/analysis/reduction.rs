@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use skinrig_analysis::locator::FittedLocator;
 use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Analysis, Estimate, ReductionRow, Thinning};
 use skinrig_analysis::{Retention, SessionInput, analyze, analyze_with_events, reduction};
@@ -167,13 +168,13 @@ fn threads_do_not_matter_and_seeds_do() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build()
             .unwrap()
-            .install(|| reduction::study(&a, &kept))
+            .install(|| reduction::study(&a, &FittedLocator::of(&a).unwrap(), &kept))
     };
     let one = with_threads(1);
     assert_eq!(one, a.reduction);
     assert_eq!(one, with_threads(3));
     a.settings.seed = 2;
-    let other = reduction::study(&a, &kept).unwrap();
+    let other = reduction::study(&a, &FittedLocator::of(&a).unwrap(), &kept).unwrap();
     let fourth = |r: &skinrig_analysis::result::Reduction| r.curves[0].rows[2].rmse_mm.value;
     assert_ne!(fourth(&one.unwrap()), fourth(&other));
 }

@@ -13,7 +13,7 @@ use crate::input::{EventSource, SessionInput};
 use crate::locate_presses::{
     CalibrationOrigin, CameraObservations, LocatedPresses, locate_presses, locate_recalibrated,
 };
-use crate::locator::{EarlierCalibration, Effort};
+use crate::locator::{EarlierCalibration, Effort, FittedLocator, LocatorModelError};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::onsets::{Onset, onsets};
 use crate::press_event_collector::RetentionPlan;
@@ -234,7 +234,7 @@ fn analyze_by(
         zooms: [one.zooms, two.zooms].concat(),
         motion: None,
     };
-    evaluate(&mut analysis, input, &streams, &kept);
+    evaluate(&mut analysis, input, &streams, &kept)?;
     Ok((analysis, kept))
 }
 
@@ -285,8 +285,9 @@ fn evaluate(
     input: &SessionInput,
     streams: &Streams,
     kept: &RetainedPresses,
-) {
+) -> Result<(), LocatorModelError> {
     let table = &*analysis;
+    let locator = FittedLocator::of(table)?;
     let (findings, (coverage, cmre, bit_rates)) = rayon::join(
         || audit::audit(input, table, streams),
         || {
@@ -301,9 +302,10 @@ fn evaluate(
     analysis.coverage = coverage;
     analysis.cmre = cmre;
     analysis.bit_rates = bit_rates;
-    analysis.reduction = reduction::study(analysis, kept);
+    analysis.reduction = reduction::study(analysis, &locator, kept);
     analysis.latency = latency::study(analysis, kept);
     analysis.warnings.extend(caveats::caveats(analysis));
+    Ok(())
 }
 
 /// Results of one camera.

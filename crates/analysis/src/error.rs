@@ -3,6 +3,7 @@
 use skinrig_model::{CameraId, PressId};
 
 use crate::input::EventSourceError;
+use crate::locator::LocatorModelError;
 use crate::result::RemountPart;
 
 /// Why a session cannot use the calibration of an earlier one.
@@ -161,6 +162,9 @@ pub enum AnalysisError {
     /// The calibration of an earlier session cannot be used.
     #[error("--calibration-from: {0}")]
     Recalibration(#[from] RecalibrationError),
+    /// What the locator learnt cannot be used.
+    #[error("locator of the analysis: {0}; analyse the session again")]
+    Locator(#[from] LocatorModelError),
     /// The session is invalid, and its numbers must not be used.
     #[error("the session is INVALID: {0}")]
     Invalid(String),

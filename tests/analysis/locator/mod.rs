@@ -7,7 +7,7 @@ mod remount;
 mod skins;
 mod symmetries;
 
-use skinrig_analysis::locator::FitError;
+use skinrig_analysis::locator::{FitError, FittedLocator, LocatorModelError};
 use skinrig_analysis::result::{LocatorFallback, WarningCause};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::Locator;
@@ -221,6 +221,20 @@ fn the_stored_form_locates_to_the_same_bits() {
             assert_eq!(restored.locate(&features), choice.fitted.locate(&features));
         }
     }
+}
+
+/// Rays of the drawn geometry would give other positions without a word.
+#[test]
+fn an_analysis_with_a_changed_locator_has_none() {
+    let (input, source) = skinrig_planted::grid::session();
+    let mut analysis = skinrig_analysis::analyze(&input, &source).unwrap();
+    assert!(FittedLocator::of(&analysis).is_ok());
+    let model = &mut analysis.locator.as_mut().unwrap().model;
+    model.geometry_covariance = Some(vec![vec![1.0]]);
+    assert_eq!(
+        FittedLocator::of(&analysis).err(),
+        Some(LocatorModelError::CovarianceSize)
+    );
 }
 
 #[test]

@@ -273,7 +273,7 @@ fn run(bench: Bench) -> Tally {
     let presses = bench.presses();
     let streams = streams(&config, &presses);
     let analysis = analysis(&config, &presses, &streams);
-    let locator = FittedLocator::of(&analysis);
+    let locator = FittedLocator::of(&analysis).expect("a locator");
     let sights: Vec<[TouchSight; 2]> = presses
         .iter()
         .map(|p| streams.each_ref().map(|events| sight(events, p)))

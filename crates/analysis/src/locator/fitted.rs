@@ -109,13 +109,15 @@ impl FittedLocator {
         }
     }
 
-    /// The locator of an analysis; the rays of its geometry if it holds none that can be read.
-    #[must_use]
-    pub fn of(analysis: &Analysis) -> Self {
-        let stored = analysis.locator.as_ref();
-        let learnt =
-            stored.and_then(|l| Self::new(l.locator, analysis.geometry, l.model.clone()).ok());
-        learnt.unwrap_or_else(|| Self::rays(analysis.geometry))
+    /// The locator of an analysis; the rays of its geometry if it has none.
+    ///
+    /// # Errors
+    /// [`LocatorModelError`] if what the locator learnt was changed.
+    pub fn of(analysis: &Analysis) -> Result<Self, LocatorModelError> {
+        match &analysis.locator {
+            Some(l) => Self::new(l.locator, analysis.geometry, l.model.clone()),
+            None => Ok(Self::rays(analysis.geometry)),
+        }
     }
 
     /// The locator.

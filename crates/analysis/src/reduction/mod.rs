@@ -25,16 +25,20 @@ use crate::verdict;
 
 pub(crate) use trials::{Attempt, Outcome, Trials};
 
-/// Thins the retained scored presses and locates them again; `None` if there are none.
+/// Thins the retained scored presses and locates them again with the locator of the analysis; `None` if there are none.
 #[must_use]
-pub fn study(analysis: &Analysis, retained: &RetainedPresses) -> Option<Reduction> {
+pub fn study(
+    analysis: &Analysis,
+    locator: &FittedLocator,
+    retained: &RetainedPresses,
+) -> Option<Reduction> {
     let settings = &analysis.settings;
     let attempts = attempts(analysis, retained);
     if attempts.is_empty() {
         return None;
     }
     let trials = Trials {
-        locator: &FittedLocator::of(analysis),
+        locator,
         outline: &analysis.rig.outline,
         settings,
         min_samples: match settings.reduction.min_samples {

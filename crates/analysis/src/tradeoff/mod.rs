@@ -73,7 +73,7 @@ pub fn measure(
         (CalibrationModel::Auto, None) => CalibrationModel::None,
         (named, _) => named,
     };
-    let locator = FittedLocator::of(&analysis).locator();
+    let locator = FittedLocator::of(&analysis)?.locator();
     let press_s = replay.press_s(&reading.settings);
     let mut rows = Vec::new();
     let mut candidates = Vec::new();

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
+use skinrig_analysis::locator::FittedLocator;
 use skinrig_analysis::{ANALYSIS_VERSION, Analysis};
 
 use super::results_path;
@@ -27,7 +28,8 @@ struct VariantName {
 }
 
 /// Reads the results of the analysis `name` (`None`: the official one), without the bulk data for figures. Returns `None` if they
-/// are missing, belong to another session or analysis, or come from another version of the analysis.
+/// are missing, belong to another session or analysis, come from another version of the analysis, or hold a locator that was
+/// changed.
 pub(crate) fn stored(session: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis> {
     let text = std::fs::read(results_path(session, name)).ok()?;
     // Another version may have other fields, and then does not parse.
@@ -35,5 +37,6 @@ pub(crate) fn stored(session: &Path, session_id: &str, name: Option<&str>) -> Op
     let variant = found.provenance.variant.map(|v| v.name);
     let is_own = found.provenance.session_id == session_id && variant.as_deref() == name;
     let is_current = found.analysis.version == ANALYSIS_VERSION;
-    (is_own && is_current).then_some(found.analysis)
+    let has_locator = FittedLocator::of(&found.analysis).is_ok();
+    (is_own && is_current && has_locator).then_some(found.analysis)
 }

@@ -31,7 +31,8 @@ pub(crate) fn cross_evaluate(
     locations: &Locations,
     shared: &[u32],
 ) -> Vec<CrossEvaluation> {
-    let locator = |s: &Subject| s.sessions.first().map(|s| FittedLocator::of(&s.analysis));
+    // Stored analyses whose locator cannot be used are analysed again when they are read, so all subjects have theirs.
+    let locator = |s: &Subject| FittedLocator::of(&s.sessions.first()?.analysis).ok();
     let (Some(of_a), Some(of_b)) = (locator(a), locator(b)) else {
         return Vec::new();
     };
