@@ -18,7 +18,7 @@ test-all:
 lint:
     cargo fmt --all --check
     cargo clippy --workspace --all-targets --locked -- -D warnings
-    cargo clippy -p skinrig --all-targets --features evk4,tls --locked -- -D warnings
+    cargo clippy -p skinrig --all-targets --features evk4,tls,postgres --locked -- -D warnings
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 
 # Complete check of a clean clone.

@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
+use skinrig_catalogue::{ANALYSIS_MARK, RESULTS_SUFFIX};
 use skinrig_report::{Summary, Variant};
 
 use crate::analysis_request::AnalysisRequest;
@@ -16,16 +17,12 @@ use crate::paths::{beside, folder_of};
 pub(crate) use self::stored::stored;
 pub(crate) use self::summary::{SummaryError, summary};
 
-/// Precedes the variant's name in its file names.
-const MARK: &str = ".analysis-";
-/// Suffix of every results file.
-const RESULTS: &str = ".results.json";
 /// Longest name, in characters.
 const MAX_CHARS: usize = 60;
 
 /// Path of the results of the analysis `name`; `None` is the official one.
 pub(crate) fn results_path(session: &Path, name: Option<&str>) -> PathBuf {
-    path(session, name, RESULTS)
+    path(session, name, RESULTS_SUFFIX)
 }
 
 /// Path of its report.
@@ -41,7 +38,7 @@ pub(crate) fn tradeoff_path(session: &Path, name: Option<&str>) -> PathBuf {
 fn path(session: &Path, name: Option<&str>, ending: &str) -> PathBuf {
     match name {
         None => beside(session, ending),
-        Some(name) => beside(session, &format!("{MARK}{name}{ending}")),
+        Some(name) => beside(session, &format!("{ANALYSIS_MARK}{name}{ending}")),
     }
 }
 
@@ -145,7 +142,7 @@ pub(crate) fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
         name,
     };
     let official = results_path(session, None).is_file().then(|| listed(None));
-    let stem = beside(session, MARK);
+    let stem = beside(session, ANALYSIS_MARK);
     let stem = stem
         .file_name()
         .unwrap_or_default()
@@ -158,7 +155,7 @@ pub(crate) fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
     let mut names: Vec<String> = entries
         .filter_map(|entry| {
             let file = entry.file_name().to_string_lossy().into_owned();
-            let name = file.strip_prefix(&stem)?.strip_suffix(RESULTS)?;
+            let name = file.strip_prefix(&stem)?.strip_suffix(RESULTS_SUFFIX)?;
             parse(name).ok()
         })
         .collect();

@@ -80,6 +80,7 @@ pub(crate) fn conclude(
     } else {
         analyse(session, max_rmse_mm, output)
     };
+    crate::catalogue::automatic::register(session);
     // The end of the run takes precedence: a failed analysis must not hide a rig fault.
     let ended = end_of(session, report);
     if matches!(ended, Ok(None)) {

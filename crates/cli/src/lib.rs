@@ -7,6 +7,7 @@ mod terminal;
 mod analyses;
 pub mod analysis_request;
 mod args;
+mod catalogue;
 mod challenge;
 pub mod check;
 mod compare;
@@ -125,6 +126,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::View(a) => view::view(a, json),
         Command::Prototypes(a) => prototypes::prototypes(a, json),
         Command::Tag(a) => tag::tag(a, json),
+        Command::Catalogue(a) => catalogue::catalogue(a, json),
         Command::Sessions(a) => sessions::sessions(a, json),
         Command::Show(a) => show::show(a, json),
         Command::Analyze(a) => results::analyze(a, output),

@@ -246,6 +246,7 @@ pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
     let older = replacement_note(&results, args.out.as_deref());
     let paths = write_shown(&results, args.out.as_deref(), html.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
+    crate::catalogue::automatic::register(&args.session);
     print_results(&results, output, &paths);
     check_limit(&results, args.max_rmse)
 }
@@ -306,6 +307,7 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
     let older = replacement_note(&results, None);
     let paths = write_shown(&results, None, args.out.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
+    crate::catalogue::automatic::register(&args.session);
     if json {
         crate::terminal::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));
     } else {

@@ -36,6 +36,9 @@ pub(crate) fn tag(args: &TagArgs, json: bool) -> Outcome {
         annotations(&session, &session_id)
     };
     let all = all.map_err(Failure::session)?;
+    if has_changes {
+        crate::catalogue::automatic::register(&session);
+    }
     if json {
         crate::terminal::print_json(&serde_json::json!({
             "session": session, "tags": all.tags, "notes": all.notes,

@@ -60,7 +60,7 @@ pub use problem::Problem;
 pub use queue::QueueLoad;
 pub use reader::SessionReader;
 pub use rows::{
-    AttemptRow, ChunkMeta, CommandRow, DeviceRow, InterruptionRow, LegRow, Loss, NoteRow,
+    AttemptRow, ChunkMeta, CommandRow, DeviceRow, Headline, InterruptionRow, LegRow, Loss, NoteRow,
     PressTally, Seal, SessionTotals,
 };
 pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};

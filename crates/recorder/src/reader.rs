@@ -11,7 +11,7 @@ use crate::error::RecorderError;
 use crate::from_row::{header_from, planned_from};
 use crate::open;
 use crate::query::{Fault, each_row, enum_value, int, real, sha, text};
-use crate::rows::{DeviceRow, PressTally, Seal, SessionTotals};
+use crate::rows::{DeviceRow, Headline, PressTally, Seal, SessionTotals};
 use crate::seal::placeholder_of;
 use crate::totals;
 
@@ -138,6 +138,32 @@ impl SessionReader {
                 prototype: text(row, "prototype")?,
                 operator: text(row, "operator")?,
                 protocol_name: text(row, "protocol_name")?,
+                rig_kind: text(row, "rig_kind")?,
+                rig_name: text(row, "rig_name")?,
+            })
+        })?
+        .pop()
+        .ok_or_else(|| self.no_header())
+    }
+
+    /// Identity of the session.
+    ///
+    /// # Errors
+    /// If the file is damaged or its header is not yet written.
+    pub fn headline(&self) -> Result<Headline, RecorderError> {
+        let sql = "SELECT session_id, started_at, prototype, protocol_name, protocol_sha256, plan_sha256, overrides_json, seed,
+                          rig_kind, rig_name
+                   FROM session";
+        self.query_all("reading its header", sql, |row| {
+            Ok(Headline {
+                session_id: text(row, "session_id")?,
+                started_at: text(row, "started_at")?,
+                prototype: text(row, "prototype")?,
+                protocol_name: text(row, "protocol_name")?,
+                protocol_sha256: text(row, "protocol_sha256")?,
+                plan_sha256: text(row, "plan_sha256")?,
+                overrides_json: text(row, "overrides_json")?,
+                seed: text(row, "seed")?,
                 rig_kind: text(row, "rig_kind")?,
                 rig_name: text(row, "rig_name")?,
             })

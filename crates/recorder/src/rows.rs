@@ -8,6 +8,31 @@ use skinrig_model::{
 
 use skinrig_formats::codec::Codec;
 
+/// Identity of a session: its header without the texts of protocol, plan and rig.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Headline {
+    /// Identifier of the session, independent of the file's name.
+    pub session_id: String,
+    /// Civil time of the start, RFC 3339.
+    pub started_at: String,
+    /// Name of the pressed prototype.
+    pub prototype: String,
+    /// Name of the protocol file.
+    pub protocol_name: String,
+    /// Lower-case hex SHA-256 of the protocol's text.
+    pub protocol_sha256: String,
+    /// Lower-case hex SHA-256 of the plan.
+    pub plan_sha256: String,
+    /// Values overridden on the command line, a JSON array of `key=value`.
+    pub overrides_json: String,
+    /// Seed of the run, decimal.
+    pub seed: String,
+    /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
+    pub rig_kind: String,
+    /// Name of the rig.
+    pub rig_name: String,
+}
+
 /// A device with its settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceRow {

@@ -81,10 +81,19 @@ fn allowed_dependencies() -> BTreeMap<String, BTreeSet<String>> {
 
 /// External crates that only some of our crates may use.
 const RESTRICTED: &[(&str, &[&str])] = &[
-    ("sqlx", &["skinrig-recorder", "skinrig-hil"]),
+    (
+        "sqlx",
+        &["skinrig-recorder", "skinrig-hil", "skinrig-catalogue"],
+    ),
     (
         "tokio",
-        &["skinrig-recorder", "skinrig-hil", "skinrig-view", "skinrig"],
+        &[
+            "skinrig-recorder",
+            "skinrig-hil",
+            "skinrig-catalogue",
+            "skinrig-view",
+            "skinrig",
+        ],
     ),
     ("axum", &["skinrig-view"]),
     ("fearless_simd", &["skinrig-simd"]),
@@ -99,7 +108,15 @@ const RESTRICTED: &[(&str, &[&str])] = &[
     ("pyo3", &["skinrig-python"]),
     ("clap", &["skinrig"]),
     ("indicatif", &["skinrig"]),
-    ("chrono", &["skinrig", "skinrig-recorder", "skinrig-hil"]),
+    (
+        "chrono",
+        &[
+            "skinrig",
+            "skinrig-recorder",
+            "skinrig-hil",
+            "skinrig-catalogue",
+        ],
+    ),
     ("rusb", &["skinrig-evk1"]),
     ("neuromorphic-drivers", &["skinrig-evk4"]),
     ("libloading", &["skinrig-omega3"]),

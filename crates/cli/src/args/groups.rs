@@ -26,6 +26,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
         "Sessions",
         &[
             "sessions",
+            "catalogue",
             "show",
             "tag",
             "verify",

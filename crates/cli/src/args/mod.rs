@@ -27,6 +27,7 @@ pub(crate) use self::files::{
     TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
+use crate::catalogue::args::CatalogueArgs;
 use crate::exit::Exit;
 use crate::hil::args::{HilArgs, HoldArmArgs};
 
@@ -144,6 +145,13 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  skinrig sessions sessions/\n  \
         skinrig sessions --prototype \"skin 7\" --tag good-skin")]
     Sessions(SessionsArgs),
+
+    /// Search all sessions: a database of sessions, analyses, devices, nights and prototypes that answers questions.
+    #[command(
+        after_help = "Example:\n  skinrig catalogue query best-prototypes min_sessions=5 --folder sessions/\n\n\
+        Everything in it is read from the files: delete it, and `skinrig catalogue rebuild` makes it again."
+    )]
+    Catalogue(CatalogueArgs),
 
     /// List the prototypes in a folder: sessions, best and latest RMSE, trend over time.
     #[command(after_help = "Examples:\n  skinrig prototypes\n  \

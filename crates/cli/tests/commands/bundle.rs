@@ -98,5 +98,6 @@ fn a_bundle_is_exported_alone() {
     let session = text(&lab.record("s", &[]));
     let export = ["export", &session, "--to", "bundle", "--to", "csv"];
     skinrig(&export).code(2).expect_stderr(&["no other format"]);
-    assert_eq!(files(&lab.path("s"), "").len(), 1);
+    let session_and_catalogue = 2;
+    assert_eq!(files(&lab.path("s"), "").len(), session_and_catalogue);
 }

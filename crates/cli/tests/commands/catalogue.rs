@@ -1,6 +1,8 @@
-//! Contents of a sessions folder: prototypes, tags, remarks.
+//! Contents of a sessions folder: prototypes, tags, remarks, and the catalogue of all.
 
-use serde_json::Value;
+use serde_json::{Value, json};
+use sqlx::ConnectOptions;
+use sqlx::sqlite::SqliteConnectOptions;
 
 use crate::support::{Lab, SMALL, files, only, skinrig, text};
 
@@ -84,6 +86,8 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
         .code(2)
         .expect_stderr(&["skin C", "skin B, test skin"]);
 
+    the_catalogue_has_the_same_answers(&s, &prototypes);
+
     // A broken tag log is reported; its session is still listed.
     let log = only(&lab.path("s"), ".tags.jsonl");
     std::fs::write(&log, "good-skin\n").unwrap();
@@ -95,4 +99,133 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
     skinrig(&["tag", &text(first), "more"])
         .code(2)
         .expect_stderr(&["line 1"]);
+}
+
+/// Without being asked, the catalogue has what reading the files gives.
+fn the_catalogue_has_the_same_answers(s: &str, prototypes: &Value) {
+    let status = skinrig(&["catalogue", "status", s, "--json"])
+        .code(0)
+        .json();
+    let (current, stale) = (&status["status"]["current"], &status["status"]["stale"]);
+    assert_eq!((current, stale), (&json!(3), &json!([])));
+    let ask = |words: &[&str]| -> Vec<Value> {
+        let all = [&["catalogue", "query"], words, &["--folder", s, "--json"]].concat();
+        let answer = skinrig(&all).code(0);
+        assert_eq!(answer.err, "", "nothing is stale");
+        answer.json()["rows"].as_array().unwrap().clone()
+    };
+    let points = prototypes[1]["series"][0]["points"].as_array().unwrap();
+    let trend = ask(&["prototype-trend", "prototype=test skin"]);
+    assert_eq!(trend.len(), points.len());
+    for (row, point) in trend.iter().zip(points) {
+        assert_eq!(row["started_at"], point["started_at"]);
+        for (own, part) in [
+            ("rmse_mm", "value"),
+            ("rmse_low_mm", "low"),
+            ("presses", "n"),
+        ] {
+            assert_eq!(row[own], point["rmse_mm"][part], "{own}");
+        }
+    }
+    let best = ask(&["best-prototypes", "min_sessions=2"]);
+    assert_eq!((best.len(), &best[0]["sessions"]), (1, &json!(2)));
+    assert_eq!(
+        best[0]["best_rmse_mm"],
+        prototypes[1]["series"][0]["best"]["value"]
+    );
+    assert_eq!(ask(&["tagged", "tag=good-skin"]).len(), 1);
+    assert_eq!(
+        ask(&["notes", "text=lamp"])[0]["text"],
+        json!("the lamp was new")
+    );
+    let listed = skinrig(&["sessions", s, "--json"]).code(0).json();
+    let listed = listed.as_array().unwrap();
+    for row in ask(&["rigs"]) {
+        let sum = |key: &str| -> u64 {
+            let one = |session: &Value| session["state"]["presses"][key].as_u64().unwrap();
+            listed.iter().map(one).sum()
+        };
+        assert_eq!(
+            (&row["planned"], &row["valid"]),
+            (&json!(sum("planned")), &json!(sum("valid")))
+        );
+        assert_eq!(row["sessions"], json!(listed.len()));
+    }
+    let drift = ask(&["clock-drift"]);
+    assert_eq!(drift.len(), 2, "two simulated cameras: {drift:?}");
+    // Rebuilt from nothing: the same answers.
+    let before = ask(&["devices"]);
+    std::fs::remove_file(std::path::Path::new(s).join("catalogue.sqlite")).unwrap();
+    skinrig(&["catalogue", "query", "devices", "--folder", s])
+        .code(2)
+        .expect_stderr(&["skinrig catalogue rebuild"]);
+    let rebuilt = skinrig(&["catalogue", "rebuild", s]).code(0).out;
+    assert!(rebuilt.contains("3 read"), "{rebuilt}");
+    assert_eq!(ask(&["devices"]), before);
+    assert_eq!(ask(&["prototype-trend", "prototype=test skin"]), trend);
+    let words = skinrig(&["catalogue", "query", "devices", "--folder", s])
+        .code(0)
+        .out;
+    assert!(words.contains("sim-00000001-c1"), "{words}");
+}
+
+/// A run neither waits for a catalogue that is in use nor fails because of one that cannot be used; its session is then stale.
+#[test]
+fn a_run_does_without_a_catalogue() {
+    let lab = Lab::new();
+    let s = lab.text("s");
+    std::fs::create_dir(lab.path("s")).unwrap();
+    let file = lab.path("s").join("catalogue.sqlite");
+    std::fs::write(&file, "not a catalogue").unwrap();
+    let run = ["run", SMALL, "--sessions", &s, "--no-analysis"];
+    let next = "skinrig catalogue register";
+    skinrig(&run)
+        .code(0)
+        .expect_stderr(&["is not in the catalogue", "not SQLite", next]);
+    assert_eq!(std::fs::read(&file).unwrap(), b"not a catalogue");
+    skinrig(&["catalogue", "register", &s])
+        .code(2)
+        .expect_stderr(&["move it away"]);
+    std::fs::remove_file(&file).unwrap();
+    let session = only(&lab.path("s"), ".session.sqlite");
+    skinrig(&["catalogue", "register", &text(&session)]).code(0);
+
+    // In use by another program, which never ends.
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .unwrap();
+    let options = SqliteConnectOptions::new().filename(&file);
+    let mut other = runtime.block_on(options.connect()).unwrap();
+    let lock = sqlx::query("BEGIN EXCLUSIVE").execute(&mut other);
+    runtime.block_on(lock).unwrap();
+    let note = "another program is writing the catalogue";
+    skinrig(&["tag", &text(&session), "wet"])
+        .code(0)
+        .expect_stderr(&[note, next]);
+    drop(other);
+    let status = skinrig(&["catalogue", "status", &s]).code(0).out;
+    for part in ["0 current, 1 stale", "changed since it was read", next] {
+        assert!(status.contains(part), "{part}: {status}");
+    }
+    let done = skinrig(&["catalogue", "register", &s, "--json"])
+        .code(0)
+        .json();
+    let registered = done["sessions"]["registered"].as_array().unwrap();
+    assert_eq!(registered.len(), 1, "{done}");
+    // Given by name, a session that cannot be read is an error.
+    std::fs::write(lab.path("s").join("b.session.sqlite"), "no session").unwrap();
+    skinrig(&["catalogue", "register", &lab.text("s/b.session.sqlite")]).code(2);
+    let status = skinrig(&["catalogue", "status", &s]).code(0).out;
+    assert!(
+        status.contains("unreadable  b.session.sqlite: "),
+        "{status}"
+    );
+    skinrig(&["catalogue", "query", "devises"])
+        .code(2)
+        .expect_stderr(&["devices"]);
+    let list = skinrig(&["catalogue", "query"]).code(0).out;
+    assert!(
+        list.contains("tagged") && list.contains("tag=..."),
+        "{list}"
+    );
 }

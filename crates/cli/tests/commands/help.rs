@@ -2,7 +2,7 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 30] = [
+const COMMANDS: [&str; 31] = [
     "init",
     "new",
     "doctor",
@@ -15,6 +15,7 @@ const COMMANDS: [&str; 30] = [
     "run",
     "resume",
     "sessions",
+    "catalogue",
     "show",
     "analyze",
     "report",

@@ -1,0 +1,7 @@
+SELECT s.prototype, s.rig_kind, count(*) AS sessions, avg(a.rmse_mm) AS mean_rmse_mm, min(a.rmse_mm) AS best_rmse_mm,
+       max(a.rmse_mm) AS worst_rmse_mm, CAST(sum(a.rmse_n) AS BIGINT) AS presses
+FROM analysis a JOIN session s ON s.session_id = a.session_id
+WHERE a.name = $2 AND a.is_valid = 1 AND a.rmse_mm IS NOT NULL
+GROUP BY s.prototype, s.rig_kind
+HAVING count(*) >= $1
+ORDER BY mean_rmse_mm, s.prototype, s.rig_kind

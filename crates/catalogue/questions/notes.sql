@@ -1,0 +1,7 @@
+SELECT s.started_at, s.prototype, n.noted_at, n.author, n.text, f.name
+FROM note n
+JOIN session s ON s.session_id = n.session_id
+JOIN session_file f ON f.session_id = s.session_id AND f.is_source = 1
+WHERE lower(n.text) LIKE '%' || lower($1) || '%'
+ORDER BY s.started_s DESC, s.session_id, n.position
+LIMIT $2

@@ -1,0 +1,5 @@
+SELECT a.name AS analysis, count(*) AS sessions, avg(a.rmse_mm) AS mean_rmse_mm, min(a.version) AS oldest_version,
+       max(a.version) AS newest_version
+FROM analysis a
+GROUP BY a.name
+ORDER BY sessions DESC, a.name

@@ -1,0 +1,140 @@
+//! Errors of a catalogue.
+
+use std::path::PathBuf;
+
+use skinrig_settings::Diagnostics;
+
+/// A catalogue could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CatalogueError {
+    /// An operation of the file system failed.
+    #[error("{}: {doing}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The failed operation.
+        doing: &'static str,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// A query failed.
+    #[error("{place}: {doing}: {source}")]
+    Sql {
+        /// The catalogue, without a password.
+        place: String,
+        /// The failed operation.
+        doing: &'static str,
+        /// Error of the database.
+        source: Box<sqlx::Error>,
+    },
+    /// Another program is writing the catalogue.
+    #[error("{place}: {doing}: another program is writing the catalogue; try again")]
+    Busy {
+        /// The catalogue.
+        place: String,
+        /// The operation that waited.
+        doing: &'static str,
+    },
+    /// There is no catalogue.
+    #[error("{place}: expected a catalogue, found none; `skinrig catalogue rebuild` creates one")]
+    Missing {
+        /// The catalogue.
+        place: String,
+    },
+    /// The file is not a catalogue.
+    #[error(
+        "{place}: expected a catalogue, found {found}; move it away, then `skinrig catalogue rebuild`"
+    )]
+    Foreign {
+        /// The file.
+        place: String,
+        /// Kind of file.
+        found: String,
+    },
+    /// The file is damaged. It holds nothing that is not in other files.
+    #[error("{place}: damaged: {found}; delete it, then `skinrig catalogue rebuild`")]
+    Damaged {
+        /// The file.
+        place: String,
+        /// Description of the damage.
+        found: String,
+    },
+    /// Another version of skinrig wrote it.
+    #[error("{place}: expected schema {supported}, found {found}; {next}")]
+    OtherSchema {
+        /// The catalogue.
+        place: String,
+        /// Its schema version.
+        found: i64,
+        /// That of this build.
+        supported: i64,
+        /// What to do.
+        next: &'static str,
+    },
+    /// The address of a server cannot be used.
+    #[error("{place}: expected {expected}, found {found}")]
+    Address {
+        /// The address, without a password.
+        place: String,
+        /// What is valid.
+        expected: &'static str,
+        /// What was found.
+        found: String,
+    },
+    /// The file of prototypes is wrong.
+    #[error("{}", .0.render(false).trim_end())]
+    Prototypes(Diagnostics),
+    /// The file is not the JSON of a night.
+    #[error("{}: expected the JSON of a finished night, found {found}", path.display())]
+    InvalidNight {
+        /// The file.
+        path: PathBuf,
+        /// What was found.
+        found: String,
+    },
+    /// A value for a question is missing or invalid.
+    #[error("{question}: expected {expected}, found {found}")]
+    Parameter {
+        /// Name of the question.
+        question: &'static str,
+        /// What is valid.
+        expected: String,
+        /// What was found.
+        found: String,
+    },
+}
+
+impl CatalogueError {
+    /// A failed query at `place`.
+    pub(crate) fn sql(place: &str, doing: &'static str, source: sqlx::Error) -> Self {
+        let place = place.to_owned();
+        // Result codes: <https://www.sqlite.org/rescode.html>.
+        let code = match &source {
+            sqlx::Error::Database(e) => e.code().and_then(|c| c.parse::<i32>().ok()),
+            _ => None,
+        };
+        match code.filter(|_| !is_of_server(&source)).map(|c| c & 0xff) {
+            Some(5 | 6) => Self::Busy { place, doing },
+            Some(11 | 26) => Self::Damaged {
+                place,
+                found: source.to_string(),
+            },
+            _ => Self::Sql {
+                place,
+                doing,
+                source: Box::new(source),
+            },
+        }
+    }
+}
+
+/// True for an error of PostgreSQL, whose codes have another meaning.
+fn is_of_server(error: &sqlx::Error) -> bool {
+    let sqlx::Error::Database(error) = error else {
+        return false;
+    };
+    error
+        .try_downcast_ref::<sqlx::sqlite::SqliteError>()
+        .is_none()
+}

@@ -1,0 +1,41 @@
+//! A catalogue of a lab: sessions, analyses, nights and prototypes in one database that answers questions.
+//!
+//! The files stay the truth. [`Catalogue::register`] reads sessions into the catalogue, each in one transaction and keyed by its
+//! own identifier, so that a repeated or interrupted call neither loses nor doubles one. [`Catalogue::status`] compares the
+//! catalogue with a folder, [`Catalogue::refresh`] reads what differs, and [`Question`] holds the questions.
+//! `migrations/catalogue/` documents the columns.
+//!
+//! All functions block: do not call them on a thread that runs async tasks.
+
+mod address;
+mod catalogue;
+mod db;
+mod entry;
+mod error;
+mod folder;
+mod insert;
+mod nights;
+mod open;
+mod prototypes;
+mod question;
+mod questions;
+mod results;
+mod schema;
+mod status;
+mod value;
+mod write;
+
+pub use address::{Address, CATALOGUE_FILE, ServerUrl};
+pub use catalogue::{Catalogue, Registration};
+pub use entry::{LegEntry, NoteEntry, SessionEntry};
+pub use error::CatalogueError;
+pub use nights::NightRegistration;
+pub use open::Access;
+pub use question::{Answer, Parameter, ParameterKind, Question};
+
+pub use results::{
+    ANALYSIS_MARK, AnalysisEntry, AnalysisFigures, CalibrationEntry, ClockEntry, EstimateEntry,
+    RESULTS_SUFFIX,
+};
+pub use status::{FolderStatus, StaleFile, Staleness, Unreadable};
+pub use value::Value;

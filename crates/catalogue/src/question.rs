@@ -1,0 +1,143 @@
+//! Questions to a catalogue: names, parameters and answers. The statements are in `questions/`.
+
+use chrono::NaiveDate;
+use serde::Serialize;
+
+use crate::catalogue::Catalogue;
+use crate::error::CatalogueError;
+use crate::value::{Bound, Value};
+
+/// A question with a fixed statement.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Question {
+    /// Name for the command line.
+    pub name: &'static str,
+    /// The question in words.
+    pub about: &'static str,
+    /// Parameters, in the order of the statement's `$1`, `$2`, ...
+    pub parameters: &'static [Parameter],
+    pub(crate) sql: &'static str,
+}
+
+/// A parameter of a question.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// Its name.
+    pub name: &'static str,
+    /// Kind of value.
+    pub kind: ParameterKind,
+    /// Value if none is given; `None`: one must be given.
+    pub default: Option<&'static str>,
+}
+
+/// Kind of value of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterKind {
+    /// Any text.
+    Text,
+    /// A count from 1.
+    Count,
+    /// A day, `2026-11-20`, from its beginning in UTC.
+    Day,
+}
+
+/// Answer to a question.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Answer {
+    /// Name of the question.
+    pub question: &'static str,
+    /// Values of the parameters.
+    pub parameters: Vec<(&'static str, String)>,
+    /// Names of the columns; empty without rows.
+    pub columns: Vec<String>,
+    /// The rows.
+    pub rows: Vec<Vec<Value>>,
+}
+
+impl ParameterKind {
+    /// Description of a valid value.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Text => "text",
+            Self::Count => "a count from 1",
+            Self::Day => "a day, for example 2026-11-20",
+        }
+    }
+
+    fn read(self, text: &str) -> Option<Bound> {
+        match self {
+            Self::Text => Some(text.into()),
+            Self::Count => text
+                .parse::<i64>()
+                .ok()
+                .filter(|n| *n >= 1)
+                .map(Bound::from),
+            Self::Day => {
+                let day = NaiveDate::parse_from_str(text, "%Y-%m-%d").ok()?;
+                Some(day.and_hms_opt(0, 0, 0)?.and_utc().timestamp().into())
+            }
+        }
+    }
+}
+
+impl Question {
+    /// The values of all parameters, from `given` or by default, as text and as bound.
+    fn bind(
+        &self,
+        given: &[(String, String)],
+    ) -> Result<Vec<(&'static str, String, Bound)>, CatalogueError> {
+        let wrong = |expected: String, found: String| CatalogueError::Parameter {
+            question: self.name,
+            expected,
+            found,
+        };
+        let names: Vec<&str> = self.parameters.iter().map(|p| p.name).collect();
+        if let Some((name, _)) = given
+            .iter()
+            .find(|(name, _)| !names.contains(&name.as_str()))
+        {
+            let expected = match names[..] {
+                [] => "no parameters".to_owned(),
+                _ => format!("parameters among {}", names.join(", ")),
+            };
+            return Err(wrong(expected, format!("`{name}`")));
+        }
+        let value = |parameter: &Parameter| {
+            let own = given.iter().rfind(|(name, _)| name == parameter.name);
+            let text = own.map(|(_, value)| value.as_str()).or(parameter.default);
+            let (name, kind) = (parameter.name, parameter.kind.words());
+            let text = text.ok_or_else(|| wrong(format!("{name}=VALUE, {kind}"), "none".into()))?;
+            let bound = parameter.kind.read(text);
+            let bound =
+                bound.ok_or_else(|| wrong(format!("{name} as {kind}"), format!("`{text}`")))?;
+            Ok((name, text.to_owned(), bound))
+        };
+        self.parameters.iter().map(value).collect()
+    }
+}
+
+impl Catalogue {
+    /// Answers a question; `given` are parameters by name.
+    ///
+    /// # Errors
+    /// [`CatalogueError::Parameter`], or if the catalogue cannot be read.
+    pub fn ask(
+        &mut self,
+        question: &'static Question,
+        given: &[(String, String)],
+    ) -> Result<Answer, CatalogueError> {
+        let parameters = question.bind(given)?;
+        let bound: Vec<Bound> = parameters.iter().map(|(.., bound)| bound.clone()).collect();
+        let rows = self.runtime.block_on(self.db.fetch(question.sql, &bound));
+        let rows =
+            rows.map_err(|e| CatalogueError::sql(self.place(), "answering a question", e))?;
+        let shown = parameters.into_iter().map(|(name, text, _)| (name, text));
+        Ok(Answer {
+            question: question.name,
+            parameters: shown.collect(),
+            columns: rows.columns,
+            rows: rows.rows,
+        })
+    }
+}

@@ -1,0 +1,237 @@
+//! Analyses beside a session: their files, and what the catalogue takes from them.
+
+use std::io::Read;
+use std::path::Path;
+
+use serde::Deserialize;
+use skinrig_recorder::SESSION_SUFFIX;
+
+/// Precedes the variant's name in its file names.
+pub const ANALYSIS_MARK: &str = ".analysis-";
+/// Suffix of every results file.
+pub const RESULTS_SUFFIX: &str = ".results.json";
+/// Name of the official analysis in the catalogue; no variant may have it.
+pub(crate) const OFFICIAL: &str = "official";
+/// Largest results file, bytes.
+const MOST_BYTES: u64 = 256 << 20;
+
+/// The name of a session file without [`SESSION_SUFFIX`].
+pub(crate) fn stem_of(file: &str) -> &str {
+    file.strip_suffix(SESSION_SUFFIX).unwrap_or(file)
+}
+
+/// An analysis as the catalogue has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnalysisEntry {
+    /// `official`, or the name of a variant.
+    pub name: String,
+    /// Its figures, or why its results cannot be used.
+    pub figures: Result<AnalysisFigures, String>,
+}
+
+/// Figures of an analysis. Fields that its version did not have are empty.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AnalysisFigures {
+    /// Version of the analysis.
+    pub version: u32,
+    /// Hash of the results.
+    pub results_hash: String,
+    /// False if the numbers must not be used.
+    pub is_valid: bool,
+    /// `key=value` of each setting that a variant changes.
+    pub changed: Vec<String>,
+    /// RMSE of the scored presses, mm, with its 95 % interval and their number.
+    pub rmse_mm: EstimateEntry,
+    /// Median error, mm.
+    pub median_mm: Option<f64>,
+    /// 95th percentile of the errors, mm.
+    pub p95_mm: Option<f64>,
+    /// Mean error along x and y, mm.
+    pub bias_mm: [Option<f64>; 2],
+    /// Standard deviation between repetitions, mm.
+    pub repeat_std_mm: Option<f64>,
+    /// Share of scored presses that were located.
+    pub located_rate: Option<f64>,
+    /// Fits between clocks.
+    pub clocks: Vec<ClockEntry>,
+    /// Calibration of the cameras.
+    pub calibration: Option<CalibrationEntry>,
+}
+
+/// An estimate with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+pub struct EstimateEntry {
+    /// `None` if n is too small.
+    pub value: Option<f64>,
+    /// Lower end of the interval.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+    /// Number of samples.
+    pub n: u32,
+}
+
+/// A fit between two clocks.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+pub struct ClockEntry {
+    /// The clocks, for example `camera1_from_box`.
+    pub map: String,
+    /// Relative rate.
+    pub drift_ppm: Option<f64>,
+    /// RMS of the residuals, µs.
+    pub residual_rms_us: Option<f64>,
+    /// Largest residual, µs.
+    pub residual_max_us: Option<f64>,
+    /// Number of ties.
+    pub n: u64,
+}
+
+/// A calibration of the cameras.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CalibrationEntry {
+    /// Fitted model.
+    pub model: String,
+    /// RMSE of the calibration presses before, mm.
+    pub rmse_before_mm: Option<f64>,
+    /// After, mm.
+    pub rmse_after_mm: Option<f64>,
+    /// Number of these presses.
+    pub n: u32,
+    /// Parameter, value, standard error.
+    pub values: Vec<(String, Option<f64>, Option<f64>)>,
+}
+
+/// The parts of a results file that the catalogue reads; all others are skipped.
+#[derive(Deserialize)]
+struct Document {
+    analysis: Analysis,
+    provenance: Provenance,
+    valid: bool,
+}
+
+#[derive(Deserialize)]
+struct Analysis {
+    version: u32,
+    #[serde(default)]
+    alignment: Alignment,
+    #[serde(default)]
+    calibration: Option<Calibration>,
+    scored: Scored,
+}
+
+#[derive(Deserialize, Default)]
+struct Alignment {
+    #[serde(default)]
+    maps: Vec<ClockEntry>,
+}
+
+#[derive(Deserialize)]
+struct Calibration {
+    model: serde_json::Value,
+    names: Vec<String>,
+    values: Vec<Option<f64>>,
+    #[serde(default)]
+    standard_errors: Vec<Option<f64>>,
+    rmse_before_mm: Option<f64>,
+    rmse_after_mm: Option<f64>,
+    n: u32,
+}
+
+#[derive(Deserialize)]
+struct Scored {
+    rmse_mm: EstimateEntry,
+    #[serde(default)]
+    median_mm: EstimateEntry,
+    #[serde(default)]
+    p95_mm: EstimateEntry,
+    #[serde(default)]
+    bias_x_mm: EstimateEntry,
+    #[serde(default)]
+    bias_y_mm: EstimateEntry,
+    #[serde(default)]
+    repeat_std_mm: EstimateEntry,
+    #[serde(default)]
+    located_rate: EstimateEntry,
+}
+
+#[derive(Deserialize)]
+struct Provenance {
+    session_id: String,
+    #[serde(default)]
+    results_hash: String,
+    #[serde(default)]
+    variant: Option<Variant>,
+}
+
+#[derive(Deserialize)]
+struct Variant {
+    name: String,
+    #[serde(default)]
+    changed: Vec<String>,
+}
+
+impl From<Calibration> for CalibrationEntry {
+    fn from(found: Calibration) -> Self {
+        let model = match found.model {
+            serde_json::Value::String(word) => word,
+            other => other.to_string(),
+        };
+        let errors = found
+            .standard_errors
+            .into_iter()
+            .chain(std::iter::repeat(None));
+        let values = found.names.into_iter().zip(found.values).zip(errors);
+        Self {
+            model,
+            rmse_before_mm: found.rmse_before_mm,
+            rmse_after_mm: found.rmse_after_mm,
+            n: found.n,
+            values: values
+                .map(|((name, value), error)| (name, value, error))
+                .collect(),
+        }
+    }
+}
+
+/// Reads the analysis `name` of the session `session_id` from its results file.
+pub(crate) fn read(path: &Path, name: &str, session_id: &str) -> AnalysisEntry {
+    AnalysisEntry {
+        name: name.to_owned(),
+        figures: figures(path, name, session_id),
+    }
+}
+
+fn figures(path: &Path, name: &str, session_id: &str) -> Result<AnalysisFigures, String> {
+    let mut text = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(MOST_BYTES).read_to_end(&mut text))
+        .map_err(|e| e.to_string())?;
+    let found: Document = serde_json::from_slice(&text).map_err(|e| {
+        format!("results of another version of skinrig: analyze the session again ({e})")
+    })?;
+    let own = &found.provenance;
+    if own.session_id != session_id {
+        return Err("the results belong to another session".to_owned());
+    }
+    let of = own.variant.as_ref().map_or(OFFICIAL, |v| v.name.as_str());
+    if of != name {
+        return Err(format!("the results are those of the analysis `{of}`"));
+    }
+    let changed = found.provenance.variant.map(|v| v.changed);
+    let analysis = found.analysis;
+    let scored = analysis.scored;
+    Ok(AnalysisFigures {
+        version: analysis.version,
+        results_hash: found.provenance.results_hash,
+        is_valid: found.valid,
+        changed: changed.unwrap_or_default(),
+        rmse_mm: scored.rmse_mm,
+        median_mm: scored.median_mm.value,
+        p95_mm: scored.p95_mm.value,
+        bias_mm: [scored.bias_x_mm.value, scored.bias_y_mm.value],
+        repeat_std_mm: scored.repeat_std_mm.value,
+        located_rate: scored.located_rate.value,
+        clocks: analysis.alignment.maps,
+        calibration: analysis.calibration.map(CalibrationEntry::from),
+    })
+}

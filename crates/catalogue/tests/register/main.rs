@@ -1,0 +1,16 @@
+//! Catalogues of recorded sessions: what is registered, what is stale, kills, foreign files.
+#![expect(clippy::unwrap_used, reason = "a test")]
+
+#[path = "../../../recorder/tests/session/common.rs"]
+#[expect(dead_code, reason = "only part of it is used here")]
+mod common;
+mod files;
+mod kills;
+#[cfg(unix)]
+mod postgres;
+mod questions;
+#[cfg(unix)]
+mod server;
+mod sessions;
+mod support;
+mod synthetic;

@@ -1,0 +1,109 @@
+//! The same catalogue on a PostgreSQL server.
+
+use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError, Question};
+
+use crate::server::Server;
+use crate::support::{Lab, WAIT};
+use crate::{questions, synthetic};
+
+#[test]
+fn a_server_gives_the_answers_of_the_embedded_catalogue() {
+    let Some(server) = Server::start() else {
+        return;
+    };
+    let lab = Lab::with_sessions(3);
+    let missing = Catalogue::open(server.address(), Access::Read, WAIT).unwrap_err();
+    assert!(
+        matches!(missing, CatalogueError::Missing { .. }),
+        "{missing:?}"
+    );
+    let mut embedded = lab.open();
+    let mut central = server.open().unwrap();
+    for catalogue in [&mut embedded, &mut central] {
+        assert_eq!(
+            catalogue
+                .refresh(lab.path(), false)
+                .unwrap()
+                .registered
+                .len(),
+            3
+        );
+        let status = catalogue.status(lab.path()).unwrap();
+        assert_eq!((status.current, status.stale.len()), (3, 0));
+        let again = catalogue.refresh(lab.path(), false).unwrap();
+        assert_eq!((again.registered.len(), again.unchanged), (0, 3));
+        let all = catalogue.refresh(lab.path(), true).unwrap();
+        assert_eq!(all.registered.len(), 3);
+    }
+    let store = questions::ask(&mut central, "unfinished", &[]).rows[0][7].clone();
+    let folder = lab.path().canonicalize().unwrap();
+    assert!(
+        store.as_text().unwrap().ends_with(folder.to_str().unwrap()),
+        "{store:?}"
+    );
+    drop(central);
+
+    // Synthetic sessions, in a database of their own: every answer is the same, row by row.
+    let other = Lab::with_sessions(0);
+    let (mut embedded, mut central) = (other.open(), server.open().unwrap());
+    central.refresh(other.path(), false).unwrap();
+    std::fs::remove_file(lab.session(0)).unwrap();
+    std::fs::remove_file(lab.session(1)).unwrap();
+    std::fs::remove_file(lab.session(2)).unwrap();
+    assert_eq!(
+        central.refresh(lab.path(), false).unwrap().forgotten.len(),
+        3
+    );
+    synthetic::write_prototypes(other.path());
+    synthetic::write_nights(&other.path().join("nights"), 20);
+    for catalogue in [&mut embedded, &mut central] {
+        catalogue.refresh(other.path(), false).unwrap();
+        let nights = catalogue
+            .register_nights(&other.path().join("nights"))
+            .unwrap();
+        assert_eq!(nights.registered, 20);
+        catalogue.add(&synthetic::sessions(200, 5)).unwrap();
+    }
+    for question in Question::all() {
+        let all = question.parameters.iter().find(|p| p.name == "limit");
+        let given: Vec<_> = all.map(|p| (p.name, "1000")).into_iter().collect();
+        let [own, servers] =
+            [&mut embedded, &mut central].map(|c| questions::ask(c, question.name, &given));
+        assert_eq!(own.columns, servers.columns, "{}", question.name);
+        assert_eq!(own.rows.len(), servers.rows.len(), "{}", question.name);
+        for (own, servers) in own.rows.iter().zip(&servers.rows) {
+            assert!(
+                questions::is_equal(own, servers),
+                "{}: {own:?} {servers:?}",
+                question.name
+            );
+        }
+    }
+}
+
+#[test]
+fn an_unreachable_server_is_an_error_without_its_password() {
+    let folder = tempfile::tempdir().unwrap();
+    let url = format!(
+        "postgres://ann:secret@localhost/skins?host={}",
+        folder.path().display()
+    );
+    let error = Catalogue::open(Address::parse(url.as_ref()), Access::Write, WAIT).unwrap_err();
+    assert!(matches!(error, CatalogueError::Sql { .. }), "{error:?}");
+    let text = format!("{error} {error:?}");
+    assert!(
+        text.contains("postgres://ann@localhost/skins") && !text.contains("secret"),
+        "{text}"
+    );
+}
+
+#[test]
+#[ignore = "measures; a minute"]
+fn ten_thousand_sessions_in_postgresql() {
+    let Some(server) = Server::start() else {
+        return;
+    };
+    let lab = Lab::with_sessions(0);
+    let mut catalogue = server.open().unwrap();
+    println!("{}", questions::measure(&mut catalogue, &lab, "PostgreSQL"));
+}

@@ -1,0 +1,24 @@
+//! Exit codes of errors of the catalogue, and how long commands wait for it.
+
+use std::time::Duration;
+
+use skinrig_catalogue::CatalogueError;
+
+use crate::exit::Failure;
+
+/// How long a command waits for another program that writes the catalogue. A write takes milliseconds.
+pub(super) const WAIT: Duration = Duration::from_secs(30);
+
+/// Bad input, unless the machine or the database failed.
+pub(super) fn failure(error: CatalogueError) -> Failure {
+    match &error {
+        CatalogueError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
+            Failure::input(error)
+        }
+        CatalogueError::Io { .. } | CatalogueError::Sql { .. } | CatalogueError::Busy { .. } => {
+            Failure::internal(error)
+        }
+        CatalogueError::Prototypes(found) => Failure::findings(found),
+        _ => Failure::input(error),
+    }
+}
