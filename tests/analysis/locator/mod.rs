@@ -214,8 +214,7 @@ fn the_stored_form_locates_to_the_same_bits() {
         let stored: skinrig_analysis::result::LocatorResult = serde_json::from_str(&text).unwrap();
         assert_eq!(stored, choice.result);
         let geometry = skins::calibrated(&skin.set()).geometry;
-        let restored =
-            skinrig_analysis::locator::FittedLocator::new(locator, geometry, stored.model).unwrap();
+        let restored = FittedLocator::new(locator, geometry, stored.model).unwrap();
         for press in skin.presses() {
             let features = skins::features(&press);
             assert_eq!(restored.locate(&features), choice.fitted.locate(&features));
