@@ -5,6 +5,7 @@ mod calibration;
 mod clocks;
 mod clustering;
 mod coverage;
+mod digits;
 mod geometry;
 mod intervals;
 mod latency;

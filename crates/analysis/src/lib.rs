@@ -23,6 +23,7 @@ pub mod cmre;
 mod counters;
 pub mod coverage;
 pub mod dbscan;
+pub mod digits;
 mod error;
 pub mod estimators;
 mod event_cache;

@@ -188,6 +188,6 @@ fn next_step(session: &Path) -> String {
 fn analyse(session: &Path, max_rmse_mm: Option<f64>, output: Output) -> Outcome {
     let results = results::analyze_shown(session, AnalysisRequest::default())?;
     let written = results::write_shown(&results, None, None)?;
-    results::print_results(&results, output, &written);
+    results::print_results(&results, None, output, &written);
     results::check_limit(&results, max_rmse_mm)
 }

@@ -32,6 +32,22 @@ impl Phase {
         })
     }
 
+    /// A phase of so many equal steps; call [`Self::step`] after each.
+    pub(crate) fn steps(text: &str, count: u32) -> Self {
+        let phase = Self::draw(
+            text,
+            "{spinner} {msg}, {pos} of {len}, {elapsed}",
+            |style| style,
+        );
+        phase.0.set_length(u64::from(count));
+        phase
+    }
+
+    /// Shows that `finished` steps are done.
+    pub(crate) fn step(&self, finished: u32) {
+        self.0.set_position(u64::from(finished));
+    }
+
     fn draw(text: &str, template: &str, keys: impl FnOnce(ProgressStyle) -> ProgressStyle) -> Self {
         let bar = ProgressBar::new_spinner();
         // The templates are constants; should one ever be wrong, the default style still shows the phase.

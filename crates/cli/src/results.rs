@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use skinrig_analysis::digits::{self, Digits};
 use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, LegStart};
 use skinrig_recorder::SessionReader;
@@ -165,7 +166,13 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 }
 
 /// Prints the answer, or all figures (`-v`), and the paths of what was written.
-pub(crate) fn print_results(results: &Results, output: Output, paths: &(PathBuf, PathBuf)) {
+/// With the true digits, if they were asked for.
+pub(crate) fn print_results(
+    results: &Results,
+    digits: Option<&Digits>,
+    output: Output,
+    paths: &(PathBuf, PathBuf),
+) {
     if output.json {
         let mut document = skinrig_report::json(&results.report_input());
         if let Some(object) = document.as_object_mut() {
@@ -175,6 +182,9 @@ pub(crate) fn print_results(results: &Results, output: Output, paths: &(PathBuf,
                     "session": results.session, "results": paths.0, "report": paths.1,
                 }),
             );
+            if let Some(digits) = digits {
+                object.insert("digits".into(), serde_json::json!(digits));
+            }
         }
         crate::terminal::print_json(&document);
     } else {
@@ -186,6 +196,9 @@ pub(crate) fn print_results(results: &Results, output: Output, paths: &(PathBuf,
             skinrig_report::terminal_summary(&input, color)
         };
         crate::terminal::out(format_args!("{text}"));
+        if let Some(digits) = digits {
+            crate::terminal::out(format_args!("\n{}\n", skinrig_report::digits_text(digits)));
+        }
         outln!("session   {}", results.session.display());
         outln!("results   {}", paths.0.display());
         outln!("report    {}", paths.1.display());
@@ -247,8 +260,22 @@ pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
     let paths = write_shown(&results, args.out.as_deref(), html.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
     crate::catalogue::automatic::register(&args.session);
-    print_results(&results, output, &paths);
+    let digits = args.digits.map(|n| true_digits(&args.session, choices, n));
+    print_results(&results, digits.transpose()?.as_ref(), output, &paths);
     check_limit(&results, args.max_rmse)
+}
+
+/// Digits of the results that hold when measured numbers move by one unit in the last place.
+fn true_digits(
+    path: &Path,
+    choices: AnalysisRequest<'_>,
+    repetitions: u32,
+) -> Result<Digits, Failure> {
+    let (aligned, _) = open(path, choices)?;
+    let phase = Phase::steps("repeating the analysis", repetitions);
+    let each = |finished| phase.step(finished);
+    digits::digits(&aligned.input, &aligned.events, repetitions, &each)
+        .map_err(|e| Failure::from(skinrig_results::ResultsError::from(e)))
 }
 
 /// Rejects `out` if the variant would replace the `official` results.

@@ -65,6 +65,12 @@ pub fn terminal_table(input: &ReportInput<'_>, color: bool) -> String {
     terminal::table(input, color)
 }
 
+/// True digits of the results: metrics, results with the fewest digits, decisions on the edge. Ends with a newline.
+#[must_use]
+pub fn digits_text(digits: &skinrig_analysis::digits::Digits) -> String {
+    terminal::digits::text(digits)
+}
+
 /// Summary in at most eight lines of at most 80 columns: RMSE with its interval, or a note that there is none; counts; the
 /// gravest faults, losses and warnings. Ends with a newline; `color` as in [`terminal_table`].
 #[must_use]

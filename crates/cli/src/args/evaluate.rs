@@ -32,6 +32,12 @@ pub struct AnalyzeArgs {
     #[arg(long, value_name = "SESSION")]
     pub calibration_from: Option<PathBuf>,
 
+    /// Repeat the analysis with measured numbers moved by one unit in the last place, and print how many digits of the results
+    /// are true [default: 100 repetitions].
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "100",
+          value_parser = clap::value_parser!(u32).range(1..=10_000), conflicts_with = "calibration_from")]
+    pub digits: Option<u32>,
+
     /// Where to write the results [default: beside the session].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

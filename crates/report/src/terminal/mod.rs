@@ -1,5 +1,6 @@
 //! Owns the terminal table of results: findings, headline, presses, clocks; the studies are in [`studies`].
 
+pub(crate) mod digits;
 mod studies;
 mod summary;
 
