@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::clock::SLOT_US;
 use crate::counts::CameraCounts;
 use crate::model::Pattern;
-use crate::regions::{COLUMNS, REGIONS, place, shifted};
+use crate::regions::{COLUMNS, REGIONS, shifted};
 use crate::training::Training;
 
 /// Part of the events of a press, on its way in, that shows how it begins.
@@ -121,13 +121,9 @@ pub(crate) fn patterns(training: &Training, cameras: &[CameraCounts; 2]) -> Vec<
                 by.and_then(|by| shifted(r, -by))
                     .map_or(0.0, |r| shapes[k][r])
             };
-            let near = |r: usize| shapes[k].iter().any(|s| *s > 0.0) && place(r).0 < COLUMNS;
             let own = blurred(&start.excess[k]);
             let mixed: Vec<f64> = (0..REGIONS)
-                .map(|r| {
-                    let own = if near(r) { own[r].max(0.0) } else { 0.0 };
-                    own + SHAPE_EVENTS * moved(r)
-                })
+                .map(|r| own[r].max(0.0) + SHAPE_EVENTS * moved(r))
                 .collect();
             let sum: f64 = mixed.iter().sum();
             if sum > 0.0 {

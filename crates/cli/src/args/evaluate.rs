@@ -6,9 +6,9 @@ use clap::{Args, ValueEnum};
 use skinrig_protocol::limits::Margin;
 
 use super::values::{
-    ReplaySpeed, length_mm, limit_mm, per_second, percent, replay_speed, stop_rule, time_s,
+    ReplaySpeed, StopRule, length_mm, limit_mm, per_second, percent, replay_speed, stop_rule,
+    time_s,
 };
-use crate::online::OnlineStop;
 
 /// Arguments of `analyze`.
 #[derive(Debug, Args)]
@@ -152,7 +152,7 @@ pub(crate) struct OnlineArgs {
 
     /// When a press could end: `2mm`, the longer semi-axis of its region; `20ms`, time after it was felt.
     #[arg(long, value_name = "LIMIT", default_value = "50ms", value_parser = stop_rule)]
-    pub stop_at: OnlineStop,
+    pub stop_at: StopRule,
 
     /// False alarms per second that the threshold allows.
     #[arg(long, value_name = "PER_S", default_value = "0.13", value_parser = per_second)]

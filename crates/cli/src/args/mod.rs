@@ -29,6 +29,7 @@ pub(crate) use self::files::{
     TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
+pub(crate) use self::values::StopRule;
 use crate::catalogue::args::CatalogueArgs;
 use crate::exit::Exit;
 use crate::hil::args::{HilArgs, HoldArmArgs};

@@ -3,8 +3,6 @@
 use skinrig_settings::Dimension;
 use skinrig_settings::quantity::{self, QuantityError};
 
-use crate::online::OnlineStop;
-
 /// Invalid value of a command line option.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum ValueError {
@@ -93,12 +91,21 @@ pub(super) fn replay_speed(text: &str) -> Result<ReplaySpeed, ValueError> {
     factor.map(|f| ReplaySpeed(Some(f))).ok_or_else(found)
 }
 
-/// A length above 0 or a time above 0 at which a press may end.
-pub(super) fn stop_rule(text: &str) -> Result<OnlineStop, ValueError> {
-    length_mm(text).map(OnlineStop::Region).or_else(|_| {
+/// When a press may end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum StopRule {
+    /// The longer semi-axis of the region is at most this, mm.
+    Region(f64),
+    /// This long after the touch was felt, ms.
+    After(f64),
+}
+
+/// A length above 0 or a time above 0.
+pub(super) fn stop_rule(text: &str) -> Result<StopRule, ValueError> {
+    length_mm(text).map(StopRule::Region).or_else(|_| {
         let quantity = quantity::parse(text, &[Dimension::Length, Dimension::Time]);
         quantity.map_err(ValueError::Quantity)?;
-        time_s(text).map(|s| OnlineStop::After(s * 1e3))
+        time_s(text).map(|s| StopRule::After(s * 1e3))
     })
 }
 

@@ -20,7 +20,7 @@ use skinrig_online::{
 use skinrig_recorder::SessionReader;
 
 use crate::analysis_request::AnalysisRequest;
-use crate::args::OnlineArgs;
+use crate::args::{OnlineArgs, StopRule};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::library::analysis_for_tables;
 use crate::phase::Phase;
@@ -30,9 +30,7 @@ use crate::terminal::Output;
 
 use feed::Feed;
 use offline::Comparison;
-use summary::{Felts, Quantiles, Sighting, StopRule};
-
-pub(crate) use summary::StopRule as OnlineStop;
+use summary::{Felts, Quantiles, Sighting, words};
 
 /// What was learnt before the replay.
 struct Learnt {
@@ -242,7 +240,7 @@ fn print(learnt: &Learnt, stop: StopRule, felts: &Felts, replay: &Replay, rig: &
         number(release.p99, 1)
     );
     for (what, at) in [
-        (stop.words(), &felts.at_stop),
+        (words(stop), &felts.at_stop),
         ("last before the release".to_owned(), &felts.at_end),
     ] {
         outln!(

@@ -5,14 +5,7 @@ use skinrig_analysis::Analysis;
 use skinrig_analysis::metrics::quantile;
 use skinrig_online::{Detection, DetectionScore, Felt, Position, ScoredPress};
 
-/// When a press may end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum StopRule {
-    /// The longer semi-axis of the region is at most this, mm.
-    Region(f64),
-    /// This long after the touch was felt, ms.
-    After(f64),
-}
+use crate::args::StopRule;
 
 /// A position of a touch.
 #[derive(Debug, Clone, Copy)]
@@ -23,22 +16,22 @@ pub(super) struct Sighting {
     pub(super) position: Position,
 }
 
-impl StopRule {
-    fn is_met(self, sighting: &Sighting) -> bool {
-        let Some(location) = sighting.position.location else {
-            return false;
-        };
-        match self {
-            Self::Region(mm) => location.region.is_some_and(|r| r.semi_axes_mm[0] <= mm),
-            Self::After(ms) => (sighting.host_us - sighting.onset_us) as f64 >= ms * 1e3,
-        }
+/// True if a press may end here.
+fn is_met(rule: StopRule, sighting: &Sighting) -> bool {
+    let Some(location) = sighting.position.location else {
+        return false;
+    };
+    match rule {
+        StopRule::Region(mm) => location.region.is_some_and(|r| r.semi_axes_mm[0] <= mm),
+        StopRule::After(ms) => (sighting.host_us - sighting.onset_us) as f64 >= ms * 1e3,
     }
+}
 
-    pub(super) fn words(self) -> String {
-        match self {
-            Self::Region(mm) => format!("region within {mm} mm"),
-            Self::After(ms) => format!("{ms} ms after the onset"),
-        }
+/// A rule as a heading.
+pub(super) fn words(rule: StopRule) -> String {
+    match rule {
+        StopRule::Region(mm) => format!("region within {mm} mm"),
+        StopRule::After(ms) => format!("{ms} ms after the onset"),
     }
 }
 
@@ -111,7 +104,7 @@ impl Felts {
             .iter()
             .filter_map(|p| Some((p.row, of_press(p)?)))
             .collect();
-        let first = |s: &[Sighting]| s.iter().find(|s| stop.is_met(s)).copied();
+        let first = |s: &[Sighting]| s.iter().find(|s| is_met(stop, s)).copied();
         let last = |s: &[Sighting]| s.iter().rfind(|s| s.position.location.is_some()).copied();
         Self {
             presses: presses.len(),
