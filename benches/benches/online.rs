@@ -6,7 +6,7 @@ use std::time::Instant;
 use skinrig_analysis::analyze;
 use skinrig_bench::files::Memory;
 use skinrig_bench::{Table, recording};
-use skinrig_formats::{Decoder, Encoder};
+use skinrig_formats::{Decoder, evt2::Encoder};
 use skinrig_model::{CameraId, CdEvent, PressRole, StreamFormat};
 use skinrig_online::{Estimate, IdleStatistic, Live, LiveSettings, Training, learn};
 

@@ -35,14 +35,14 @@ analysis: {min_samples: 20}
 ";
 
 fn session(test: impl FnOnce(&AlignedSession, &Analysis)) {
-    let (protocol, plan) = planned(PROTOCOL.trim_start()).unwrap();
-    let folder = tempfile::tempdir().unwrap();
+    let (protocol, plan) = planned(PROTOCOL.trim_start()).expect("a valid protocol");
+    let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("online.session.sqlite");
     let rig = simulated_rig(&SimConfig::new(5, SimLevel::Geometric));
-    record(&protocol, &plan, rig, &path, |_, _| {}).unwrap();
-    let opened = Session::open(&path, AnalysisOptions::default()).unwrap();
-    let aligned = opened.read_input().unwrap().align();
-    let analysis = analyze(&aligned.input, &aligned.events).unwrap();
+    record(&protocol, &plan, rig, &path, |_, _| {}).expect("a session");
+    let opened = Session::open(&path, AnalysisOptions::default()).expect("a session");
+    let aligned = opened.read_input().expect("its input").align();
+    let analysis = analyze(&aligned.input, &aligned.events).expect("an analysis");
     test(&aligned, &analysis);
 }
 
@@ -56,7 +56,7 @@ fn press_windows(analysis: &Analysis, input: &SessionInput) -> Vec<[Window; 2]> 
         windows(
             timings(),
             &input.earlier,
-            &clock.unwrap(),
+            &clock.expect("a clock"),
             &analysis.settings,
         )
     });
@@ -67,8 +67,8 @@ fn press_windows(analysis: &Analysis, input: &SessionInput) -> Vec<[Window; 2]> 
 }
 
 fn positions_are_those_of_the_analysis(aligned: &AlignedSession, analysis: &Analysis) {
-    let training = Training::of(analysis).unwrap();
-    let mut positions = PositionEstimator::of(analysis).unwrap();
+    let training = Training::of(analysis).expect("calibration presses");
+    let mut positions = PositionEstimator::of(analysis).expect("a locator");
     let mut windows = press_windows(analysis, &aligned.input)
         .into_iter()
         .peekable();
@@ -102,7 +102,7 @@ fn positions_are_those_of_the_analysis(aligned: &AlignedSession, analysis: &Anal
         }
         true
     })
-    .unwrap();
+    .expect("the events");
     assert_eq!(compared, analysis.presses.len());
 }
 
