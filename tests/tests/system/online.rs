@@ -39,7 +39,8 @@ fn session(test: impl FnOnce(&AlignedSession, &Analysis)) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("online.session.sqlite");
     let rig = simulated_rig(&SimConfig::new(5, SimLevel::Geometric));
-    record(&protocol, &plan, rig, &path, |_, _| {}).expect("a session");
+    let report = record(&protocol, &plan, rig, &path, |_, _| {}).expect("a session");
+    assert_eq!(report.valid, 27);
     let opened = Session::open(&path, AnalysisOptions::default()).expect("a session");
     let aligned = opened.read_input().expect("its input").align();
     let analysis = analyze(&aligned.input, &aligned.events).expect("an analysis");
