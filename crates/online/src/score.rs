@@ -62,7 +62,7 @@ pub struct DetectionScore {
     pub missed: usize,
     /// Presses that came while a false alarm lasted: neither felt nor missed.
     pub alarmed: usize,
-    /// Onsets between presses, until [1 ms before the contact](CONTACT_US).
+    /// Onsets between presses, until 1 ms before the contact.
     pub false_alarms: u64,
     /// Time in which an onset is a false alarm, s.
     pub at_risk_s: f64,
