@@ -174,7 +174,7 @@ pub(crate) fn mean(values: &mut [f64]) -> Option<f64> {
 }
 
 /// [`sorted_quantile`] of values in any order, in linear time; `None` without values. Reorders `values`.
-pub(crate) fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
+pub fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
     if values.is_empty() {
         return None;
     }

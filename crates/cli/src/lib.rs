@@ -28,6 +28,7 @@ pub mod library;
 mod man;
 mod new;
 mod notify;
+mod online;
 mod paths;
 mod phase;
 mod progress;
@@ -133,6 +134,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Report(a) => results::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, output),
+        Command::Online(a) => online::online(a, output),
         Command::Verify(a) => verify::verify(a, json),
         Command::Salvage(a) => salvage::salvage(a, json),
         Command::Import(a) => import::import(a, &command_line(arguments), output),

@@ -8,5 +8,6 @@ mod faults;
 mod indentation;
 mod multi_touch;
 mod numerics;
+mod online;
 mod overflow;
 mod retakes;

@@ -53,9 +53,9 @@ impl ColumnEstimate {
     }
 }
 
-/// An estimator with reusable buffers.
+/// The estimator of the settings, with reusable buffers.
 #[derive(Debug, Clone)]
-pub(crate) struct PressEstimator(Kind);
+pub struct PressEstimator(Kind);
 
 #[derive(Debug, Clone)]
 enum Kind {
@@ -70,7 +70,7 @@ enum Kind {
 impl PressEstimator {
     /// Estimator for these settings and a camera with the cropped rows `rows.0..=rows.1`. The settings are validated.
     #[must_use]
-    pub(crate) fn new(settings: &AnalysisSettings, rows: (u16, u16)) -> Self {
+    pub fn new(settings: &AnalysisSettings, rows: (u16, u16)) -> Self {
         let (side, eps) = (settings.bin_px, settings.eps_px);
         let wide = settings.precision == Precision::F64;
         Self(match settings.estimator {
@@ -88,7 +88,7 @@ impl PressEstimator {
     }
 
     /// Estimates the column of a window that begins at `from_us`, from its events in time order.
-    pub(crate) fn estimate(&mut self, events: &[PackedEvent], from_us: u32) -> ColumnEstimate {
+    pub fn estimate(&mut self, events: &[PackedEvent], from_us: u32) -> ColumnEstimate {
         match &mut self.0 {
             Kind::Clusters(e) => e.estimate(events),
             Kind::Median(e) => e.estimate(events),

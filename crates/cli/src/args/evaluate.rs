@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use skinrig_protocol::limits::Margin;
 
-use super::values::{length_mm, limit_mm, percent, time_s};
+use super::values::{
+    ReplaySpeed, StopRule, length_mm, limit_mm, per_second, percent, replay_speed, stop_rule,
+    time_s,
+};
 
 /// Arguments of `analyze`.
 #[derive(Debug, Args)]
@@ -141,6 +144,25 @@ pub(crate) struct TradeoffArgs {
     /// Where to write the page, with its results as JSON beside it [default: beside the session].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `online`.
+#[derive(Debug, Args)]
+pub(crate) struct OnlineArgs {
+    /// The session file.
+    pub session: PathBuf,
+
+    /// Speed of the replay relative to the recording: a factor, or `max`.
+    #[arg(long, value_name = "FACTOR", default_value = "max", value_parser = replay_speed)]
+    pub speed: ReplaySpeed,
+
+    /// When a press could end: `2mm`, the longer semi-axis of its region; `20ms`, time after it was felt.
+    #[arg(long, value_name = "LIMIT", default_value = "50ms", value_parser = stop_rule)]
+    pub stop_at: StopRule,
+
+    /// False alarms per second that the threshold allows.
+    #[arg(long, value_name = "PER_S", default_value = "0.13", value_parser = per_second)]
+    pub false_alarms: f64,
 }
 
 /// Arguments of `report`.

@@ -20,7 +20,14 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ),
     (
         "Analyse",
-        &["analyze", "report", "compare", "tradeoff", "prototypes"],
+        &[
+            "analyze",
+            "report",
+            "compare",
+            "tradeoff",
+            "online",
+            "prototypes",
+        ],
     ),
     (
         "Sessions",

@@ -20,13 +20,16 @@ pub(crate) use self::challenge::{
     ChallengeArgs, ChallengeCommand, ExamineArgs, MakeArgs, ScoreArgs,
 };
 pub(crate) use self::doctor::DoctorArgs;
-pub(crate) use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
+pub(crate) use self::evaluate::{
+    AnalyzeArgs, CompareArgs, CostKind, OnlineArgs, ReportArgs, TradeoffArgs,
+};
 pub(crate) use self::files::{
     CompletionsArgs, ExportArgs, ExportKind, ExportTable, ImportArgs, InitArgs, InspectArgs,
     ManArgs, NewArgs, PrototypesArgs, SalvageArgs, SchemaArgs, SchemaKind, SessionsArgs, ShowArgs,
     TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
+pub(crate) use self::values::StopRule;
 use crate::catalogue::args::CatalogueArgs;
 use crate::exit::Exit;
 use crate::hil::args::{HilArgs, HoldArmArgs};
@@ -199,6 +202,16 @@ pub(crate) enum Command {
         skinrig tradeoff sessions/NAME.session.sqlite --target-rmse 6mm --budget 100us"
     )]
     Tradeoff(TradeoffArgs),
+
+    /// Replay a session as a live source: how soon touches are felt, where, and how often wrongly.
+    #[command(
+        after_help = "Examples:\n  skinrig online sessions/NAME.session.sqlite\n  \
+        skinrig online sessions/NAME.session.sqlite --speed 1 --json\n  \
+        skinrig online sessions/NAME.session.sqlite --stop-at 2mm --false-alarms 0.01\n\n\
+        Learns from the calibration presses, replays all presses, evaluates the scored ones. --json prints one line per estimate.\n\
+        ctrl-C ends the replay with the answer so far (exit code 5)."
+    )]
+    Online(OnlineArgs),
 
     /// Verify every checksum, count and hash of a session or of a bundle made by `export`.
     #[command(

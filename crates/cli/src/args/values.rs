@@ -24,6 +24,12 @@ pub(super) enum ValueError {
     /// Not a number, or not from 0 to 100.
     #[error("expected a share from 0% to 100%, found {found}")]
     Percent { found: String },
+    /// Not a number, or not above 0.
+    #[error("expected a number per second above 0, found {found}")]
+    PerSecond { found: String },
+    /// Neither a factor above 0 nor `max`.
+    #[error("expected a factor above 0 or `max`, found {found}")]
+    Speed { found: String },
 }
 
 /// A limit above 0, mm.
@@ -54,6 +60,52 @@ fn above_zero(text: &str, dimension: Dimension) -> Result<f64, ValueError> {
     Err(ValueError::NotPositive {
         dimension,
         found: text.to_owned(),
+    })
+}
+
+/// A rate above 0, per second.
+pub(super) fn per_second(text: &str) -> Result<f64, ValueError> {
+    number_above_zero(text).ok_or_else(|| ValueError::PerSecond {
+        found: text.to_owned(),
+    })
+}
+
+fn number_above_zero(text: &str) -> Option<f64> {
+    let value = text.parse::<f64>().ok()?;
+    (value > 0.0 && value.is_finite()).then_some(value)
+}
+
+/// Speed of a replay relative to the recording; `None`: as fast as possible.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ReplaySpeed(pub(crate) Option<f64>);
+
+/// A factor above 0, or `max`.
+pub(super) fn replay_speed(text: &str) -> Result<ReplaySpeed, ValueError> {
+    if text == "max" {
+        return Ok(ReplaySpeed(None));
+    }
+    let factor = number_above_zero(text.trim_end_matches('x'));
+    let found = || ValueError::Speed {
+        found: text.to_owned(),
+    };
+    factor.map(|f| ReplaySpeed(Some(f))).ok_or_else(found)
+}
+
+/// When a press may end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum StopRule {
+    /// The longer semi-axis of the region is at most this, mm.
+    Region(f64),
+    /// This long after the touch was felt, ms.
+    After(f64),
+}
+
+/// A length above 0 or a time above 0.
+pub(super) fn stop_rule(text: &str) -> Result<StopRule, ValueError> {
+    length_mm(text).map(StopRule::Region).or_else(|_| {
+        let quantity = quantity::parse(text, &[Dimension::Length, Dimension::Time]);
+        quantity.map_err(ValueError::Quantity)?;
+        time_s(text).map(|s| StopRule::After(s * 1e3))
     })
 }
 

@@ -31,6 +31,7 @@ mod json;
 mod nightly;
 mod notify;
 mod numbering;
+mod online;
 mod operator;
 mod options;
 mod pictures;

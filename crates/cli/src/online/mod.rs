@@ -1,0 +1,313 @@
+//! `skinrig online`: a recorded session replayed as a live source through the online estimator.
+
+mod feed;
+mod offline;
+mod summary;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use serde_json::json;
+use skinrig_analysis::{Analysis, SessionInput};
+use skinrig_model::{CameraId, StreamFormat};
+use skinrig_online::{
+    Detection, Estimate, Felt, IdleStatistic, Live, LiveSettings, ThresholdError, TouchModel,
+    Training, learn,
+};
+use skinrig_recorder::SessionReader;
+
+use crate::analysis_request::AnalysisRequest;
+use crate::args::{OnlineArgs, StopRule};
+use crate::exit::{Exit, Failure, Outcome};
+use crate::library::analysis_for_tables;
+use crate::phase::Phase;
+use crate::results::open;
+use crate::signals::on_ctrl_c;
+use crate::terminal::Output;
+
+use feed::Feed;
+use offline::Comparison;
+use summary::{Felts, Quantiles, Sighting, words};
+
+/// What was learnt before the replay.
+struct Learnt {
+    training: Training,
+    model: TouchModel,
+    idle: IdleStatistic,
+    threshold: f64,
+}
+
+/// Times of a replay.
+#[derive(Debug, Clone, Serialize)]
+struct Speed {
+    events: u64,
+    events_per_s: f64,
+    /// From bytes in to decision out, µs, of packets without a position.
+    decision_us: Quantiles,
+    /// The same of packets with one.
+    position_us: Quantiles,
+}
+
+/// A replay as far as it went.
+struct Replay {
+    found: Vec<Detection>,
+    sightings: Vec<Sighting>,
+    until_us: i64,
+    stopped: bool,
+    speed: Speed,
+    compared: usize,
+    equal: usize,
+}
+
+fn line(estimate: &Estimate) -> serde_json::Value {
+    match estimate {
+        Estimate::Felt(d) => json!({
+            "t_us": d.host_us, "felt": d.felt, "since_us": d.since_us, "llr": d.llr, "near_mm": d.near_mm,
+        }),
+        Estimate::Position { host_us, position } => json!({
+            "t_us": host_us, "position": position.row(), "events": position.events,
+        }),
+    }
+}
+
+fn taught(error: ThresholdError, session: &Path) -> Failure {
+    Failure::input(format!(
+        "{0}: {error}\n  next: `skinrig show {0}` lists what was recorded",
+        session.display()
+    ))
+}
+
+fn learnt(args: &OnlineArgs, analysis: &Analysis) -> Result<Learnt, Failure> {
+    let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
+    let _phase = Phase::reading("learning", aligned.events.bytes_read());
+    let fail = |e: ThresholdError| taught(e, &args.session);
+    let training = Training::of(analysis).map_err(|e| fail(e.into()))?;
+    let model = learn(&training, &aligned.events).map_err(|e| fail(e.into()))?;
+    let idle =
+        IdleStatistic::measure(&model, &training, &aligned.events, |_, _| true).map_err(fail)?;
+    let threshold = idle.threshold(args.false_alarms);
+    Ok(Learnt {
+        training,
+        model,
+        idle,
+        threshold,
+    })
+}
+
+/// Waits until the session time that has passed since `start` is due.
+fn keep_pace(start: Instant, passed_us: i64, speed: f64, stop: &AtomicBool) {
+    let due = Duration::from_micros((passed_us.max(0) as f64 / speed) as u64);
+    while let Some(left) = due.checked_sub(start.elapsed()).filter(|l| !l.is_zero()) {
+        if stop.load(Ordering::Relaxed) {
+            return;
+        }
+        std::thread::sleep(left.min(Duration::from_millis(50)));
+    }
+}
+
+fn replay(
+    args: &OnlineArgs,
+    reader: &SessionReader,
+    (analysis, input): (&Analysis, &SessionInput),
+    formats: [StreamFormat; 2],
+    learnt: &Learnt,
+    output: Output,
+) -> Result<Replay, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    on_ctrl_c(move |_| asked.store(true, Ordering::Relaxed)).map_err(Failure::internal)?;
+    let clocks = *learnt.training.clocks();
+    let settings = LiveSettings {
+        threshold: learnt.threshold,
+        every_us: 5_000,
+        from_us: 0,
+    };
+    let mut live =
+        Live::new(formats, analysis, &learnt.model, &clocks, settings).map_err(Failure::input)?;
+    let mut feed = Feed::open(reader, clocks).map_err(Failure::session)?;
+    let mut comparison = Comparison::new(analysis, input).map_err(Failure::input)?;
+    let (mut found, mut sightings): (Vec<Detection>, Vec<Sighting>) = (Vec::new(), Vec::new());
+    let mut onset_us = 0;
+    let (mut events, mut busy_s) = (0u64, 0.0);
+    let mut times: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
+    let mut estimates: Vec<Estimate> = Vec::new();
+    let (start, mut first_us) = (Instant::now(), None);
+    while !stop.load(Ordering::Relaxed) {
+        let Some(packet) = feed.next(&live).map_err(Failure::session)? else {
+            break;
+        };
+        estimates.clear();
+        let arrived = Instant::now();
+        if packet.lost > 0 {
+            live.lost(packet.camera, packet.lost);
+        }
+        let count = live
+            .push(packet.camera, packet.bytes, |e| estimates.push(e))
+            .map_err(Failure::input)?;
+        let taken_s = arrived.elapsed().as_secs_f64();
+        let located = estimates
+            .iter()
+            .any(|e| matches!(e, Estimate::Position { .. }));
+        times[usize::from(located)].push(taken_s * 1e6);
+        events += count as u64;
+        busy_s += taken_s;
+        comparison.push(packet.camera, live.packet());
+        for estimate in &estimates {
+            if output.json {
+                outln!("{}", line(estimate));
+            }
+            match *estimate {
+                Estimate::Felt(d) => {
+                    if d.felt == Felt::Onset {
+                        onset_us = d.host_us;
+                    }
+                    found.push(d);
+                }
+                Estimate::Position { host_us, position } => {
+                    sightings.push(Sighting {
+                        host_us,
+                        onset_us,
+                        position,
+                    });
+                }
+            }
+        }
+        if let Some(speed) = args.speed.0 {
+            let now_us = live.detector().now_us();
+            // The streams begin where both cameras have sent something.
+            if live.newest_us(CameraId::One).is_some() && live.newest_us(CameraId::Two).is_some() {
+                let first_us = *first_us.get_or_insert(now_us);
+                keep_pace(start, now_us - first_us, speed, &stop);
+            }
+        }
+    }
+    let [decision, position] = times;
+    Ok(Replay {
+        until_us: live.detector().now_us(),
+        stopped: stop.load(Ordering::Relaxed),
+        speed: Speed {
+            events,
+            events_per_s: events as f64 / busy_s.max(f64::MIN_POSITIVE),
+            decision_us: Quantiles::of(decision),
+            position_us: Quantiles::of(position),
+        },
+        compared: comparison.compared,
+        equal: comparison.equal,
+        found,
+        sightings,
+    })
+}
+
+fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".to_owned(), |v| format!("{v:.digits$}"))
+}
+
+fn print(learnt: &Learnt, stop: StopRule, felts: &Felts, replay: &Replay, rig: &str) {
+    outln!("rig       {rig}");
+    outln!(
+        "learnt    {} places, {:.0} idle events/s; threshold {:.1} nats from {:.0} s of idle time",
+        learnt.model.places(),
+        learnt.model.idle_per_s(),
+        learnt.threshold,
+        learnt.idle.seconds()
+    );
+    outln!(
+        "felt      {} of {} scored presses; {} missed, {} during a false alarm",
+        felts.felt,
+        felts.presses,
+        felts.missed,
+        felts.alarmed
+    );
+    let (delay, release) = (felts.delay_ms, felts.release_ms);
+    outln!(
+        "delay     median {} ms, p99 {} ms after measured contact",
+        number(delay.median, 1),
+        number(delay.p99, 1)
+    );
+    if let Some((per_s, (low, high))) = felts.false_alarms_per_s {
+        outln!(
+            "false     {} alarms before contact in {:.0} s: {per_s:.3}/s, 95 % interval [{low:.3}, {high:.3}]",
+            felts.false_alarms,
+            felts.at_risk_s
+        );
+    }
+    outln!(
+        "release   median {} ms, p99 {} ms after the measured one",
+        number(release.median, 1),
+        number(release.p99, 1)
+    );
+    for (what, at) in [
+        (words(stop), &felts.at_stop),
+        ("last before the release".to_owned(), &felts.at_end),
+    ] {
+        outln!(
+            "position  {what}: error median {} mm, p99 {} mm, n {}; its region holds {} of them",
+            number(at.error_mm.median, 2),
+            number(at.error_mm.p99, 2),
+            at.error_mm.n,
+            at.inside
+                .map_or("-".to_owned(), |s| format!("{:.0} %", 100.0 * s))
+        );
+    }
+    outln!(
+        "offline   {} of {} press windows give the bits of the analysis",
+        replay.equal,
+        replay.compared
+    );
+    let speed = &replay.speed;
+    outln!(
+        "speed     {:.2} Mev/s; a packet takes {} µs (p99 {}), with a position {} µs (p99 {})",
+        speed.events_per_s * 1e-6,
+        number(speed.decision_us.median, 0),
+        number(speed.decision_us.p99, 0),
+        number(speed.position_us.median, 0),
+        number(speed.position_us.p99, 0)
+    );
+}
+
+/// `skinrig online`.
+///
+/// # Errors
+/// When the session cannot be read or analysed, or has too few calibration presses to learn from.
+pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
+    let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
+    let id = reader.session_id().map_err(Failure::session)?;
+    let (analysis, legs) = analysis_for_tables(&args.session, &reader, &id)?;
+    if !legs.is_empty() {
+        return Err(Failure::input(format!(
+            "{0}: expected a session recorded in one go, found {1} legs\n  next: `skinrig analyze {0}` analyses resumed sessions",
+            args.session.display(),
+            legs.len() + 1
+        )));
+    }
+    let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
+    let learnt = learnt(args, &analysis)?;
+    let both = (&analysis, &aligned.input);
+    let replay = replay(args, &reader, both, header.stream_formats, &learnt, output)?;
+    let felts = Felts::new(
+        &analysis,
+        &replay.found,
+        &replay.sightings,
+        args.stop_at,
+        replay.until_us,
+    );
+    if output.json {
+        let summary = json!({ "summary": {
+            "rig": header.rig_name, "threshold": learnt.threshold, "places": learnt.model.places(),
+            "felt": felts, "speed": replay.speed, "stopped": replay.stopped,
+            "windows": replay.compared, "windows_equal_to_analysis": replay.equal,
+        }});
+        outln!("{summary}");
+    } else {
+        print(&learnt, args.stop_at, &felts, &replay, &header.rig_name);
+    }
+    Ok(if replay.stopped {
+        Exit::Stopped
+    } else {
+        Exit::Ok
+    })
+}

@@ -1,0 +1,150 @@
+//! What a replay showed: how soon and how truly touches were felt, where, and how fast.
+
+use serde::Serialize;
+use skinrig_analysis::Analysis;
+use skinrig_analysis::metrics::quantile;
+use skinrig_online::{Detection, DetectionScore, Felt, Position, ScoredPress};
+
+use crate::args::StopRule;
+
+/// A position of a touch.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sighting {
+    pub(super) host_us: i64,
+    /// Onset of the touch, host µs.
+    pub(super) onset_us: i64,
+    pub(super) position: Position,
+}
+
+/// True if a press may end here.
+fn is_met(rule: StopRule, sighting: &Sighting) -> bool {
+    let Some(location) = sighting.position.location else {
+        return false;
+    };
+    match rule {
+        StopRule::Region(mm) => location.region.is_some_and(|r| r.semi_axes_mm[0] <= mm),
+        StopRule::After(ms) => (sighting.host_us - sighting.onset_us) as f64 >= ms * 1e3,
+    }
+}
+
+/// A rule as a heading.
+pub(super) fn words(rule: StopRule) -> String {
+    match rule {
+        StopRule::Region(mm) => format!("region within {mm} mm"),
+        StopRule::After(ms) => format!("{ms} ms after the onset"),
+    }
+}
+
+/// Median and 99th percentile.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Quantiles {
+    pub(super) n: usize,
+    pub(super) median: Option<f64>,
+    pub(super) p99: Option<f64>,
+}
+
+impl Quantiles {
+    pub(super) fn of(mut values: Vec<f64>) -> Self {
+        Self {
+            n: values.len(),
+            median: quantile(&mut values, 0.5),
+            p99: quantile(&mut values, 0.99),
+        }
+    }
+}
+
+/// The scored presses at a moment.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct At {
+    pub(super) after_onset_ms: Quantiles,
+    pub(super) error_mm: Quantiles,
+    /// Share of positions whose stated region holds the truth; `None` without regions.
+    pub(super) inside: Option<f64>,
+}
+
+/// Result of a replay.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Felts {
+    pub(super) presses: usize,
+    pub(super) felt: usize,
+    pub(super) missed: usize,
+    pub(super) alarmed: usize,
+    pub(super) delay_ms: Quantiles,
+    pub(super) release_ms: Quantiles,
+    pub(super) false_alarms: u64,
+    pub(super) at_risk_s: f64,
+    pub(super) false_alarms_per_s: Option<(f64, (f64, f64))>,
+    pub(super) at_stop: At,
+    /// The same at the last position before the release.
+    pub(super) at_end: At,
+}
+
+impl Felts {
+    pub(super) fn new(
+        analysis: &Analysis,
+        found: &[Detection],
+        sightings: &[Sighting],
+        stop: StopRule,
+        until_us: i64,
+    ) -> Self {
+        let presses: Vec<ScoredPress> = ScoredPress::of(analysis)
+            .into_iter()
+            .filter(|p| p.release_us + 100e3 < until_us as f64)
+            .collect();
+        let score = DetectionScore::new(found, &presses);
+        let of_press = |press: &ScoredPress| {
+            let range = press.contact_us - 1e3..press.release_us;
+            let onset = found
+                .iter()
+                .find(|d| d.felt == Felt::Onset && range.contains(&(d.host_us as f64)))?;
+            let own = |s: &&Sighting| s.onset_us == onset.host_us;
+            Some(sightings.iter().filter(own).copied().collect::<Vec<_>>())
+        };
+        let seen: Vec<(usize, Vec<Sighting>)> = presses
+            .iter()
+            .filter_map(|p| Some((p.row, of_press(p)?)))
+            .collect();
+        let first = |s: &[Sighting]| s.iter().find(|s| is_met(stop, s)).copied();
+        let last = |s: &[Sighting]| s.iter().rfind(|s| s.position.location.is_some()).copied();
+        Self {
+            presses: presses.len(),
+            felt: score.delays_ms.len(),
+            missed: score.missed,
+            alarmed: score.alarmed,
+            delay_ms: Quantiles::of(score.delays_ms.iter().map(|d| d.1).collect()),
+            release_ms: Quantiles::of(score.releases_ms.clone()),
+            false_alarms: score.false_alarms,
+            at_risk_s: score.at_risk_s,
+            false_alarms_per_s: score.false_alarms_per_s(),
+            at_stop: at(analysis, &seen, first),
+            at_end: at(analysis, &seen, last),
+        }
+    }
+}
+
+fn at(
+    analysis: &Analysis,
+    seen: &[(usize, Vec<Sighting>)],
+    choose: impl Fn(&[Sighting]) -> Option<Sighting>,
+) -> At {
+    let (mut after, mut errors, mut inside, mut regions) = (Vec::new(), Vec::new(), 0, 0);
+    for (row, sightings) in seen {
+        let chosen = choose(sightings);
+        let located = chosen.and_then(|s| Some((s, s.position.location?)));
+        let Some(((sighting, location), truth)) = located.zip(analysis.presses[*row].truth) else {
+            continue;
+        };
+        let error = [truth.x_mm - location.at[0], truth.y_mm - location.at[1]];
+        after.push((sighting.host_us - sighting.onset_us) as f64 * 1e-3);
+        errors.push(error[0].hypot(error[1]));
+        if let Some(region) = location.region {
+            regions += 1;
+            inside += usize::from(region.reach(error) <= 1.0);
+        }
+    }
+    At {
+        after_onset_ms: Quantiles::of(after),
+        error_mm: Quantiles::of(errors),
+        inside: (regions > 0).then(|| f64::from(inside as u32) / f64::from(regions)),
+    }
+}

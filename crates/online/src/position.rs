@@ -1,0 +1,203 @@
+//! The position of a touch at every instant: the events of its window so far, through the estimator and locator of the analysis.
+
+use std::collections::VecDeque;
+
+use serde::Serialize;
+use skinrig_analysis::Analysis;
+use skinrig_analysis::estimators::{PressEstimator, Thinning};
+use skinrig_analysis::locator::{CameraFeatures, FittedLocator, Location, LocatorModelError};
+use skinrig_analysis::press_events::PackedEvent;
+use skinrig_analysis::result::{LocationOutcome, Region};
+use skinrig_model::{
+    AnalysisSettings, CameraId, CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH, SkinOutline,
+};
+
+/// Newest events of each camera, to which a window can reach back: 2 MiB.
+const HISTORY: usize = 1 << 17;
+/// Events of a window in each camera: 32 MiB.
+const MOST: usize = 1 << 22;
+
+/// A position so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Position {
+    /// As the analysis states it.
+    pub outcome: LocationOutcome,
+    /// Position with its region and flag; `None` without one.
+    pub location: Option<Location>,
+    /// Events of the window so far, in each camera.
+    pub events: [u32; 2],
+    /// False if a window began before the events that are kept, or holds too many: some did not count.
+    pub complete: bool,
+}
+
+/// A position as other programs read it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PositionRow {
+    /// mm.
+    pub at_mm: [f64; 2],
+    /// The region that the locator states for a complete press. Its coverage in an earlier instant is not 95 %.
+    pub region: Option<Region>,
+}
+
+impl Position {
+    /// The row; `None` without a position.
+    #[must_use]
+    pub fn row(&self) -> Option<PositionRow> {
+        let location = self.location?;
+        Some(PositionRow {
+            at_mm: location.at,
+            region: location.region,
+        })
+    }
+}
+
+/// Window of a touch in one camera.
+#[derive(Debug, Clone)]
+struct CameraWindow {
+    rows: (u16, u16),
+    thinning: Thinning,
+    estimator: PressEstimator,
+    /// The newest events; at most [`HISTORY`].
+    history: VecDeque<CdEvent>,
+    forgotten_us: Option<u64>,
+    from_us: Option<u64>,
+    /// Events since the start of the window.
+    events: Vec<PackedEvent>,
+    in_order: bool,
+    complete: bool,
+}
+
+impl CameraWindow {
+    fn new(settings: &AnalysisSettings, camera: CameraId) -> Self {
+        let rows = settings.crop_v[camera.index()];
+        Self {
+            rows,
+            thinning: Thinning::new(settings.thinning, camera, settings.seed),
+            estimator: PressEstimator::new(settings, rows),
+            history: VecDeque::with_capacity(HISTORY),
+            forgotten_us: None,
+            from_us: None,
+            events: Vec::with_capacity(MOST),
+            in_order: true,
+            complete: true,
+        }
+    }
+
+    fn counts(&self, e: &CdEvent) -> bool {
+        let on_sensor = e.x < SENSOR_WIDTH && e.y < SENSOR_HEIGHT;
+        on_sensor && (self.rows.0..=self.rows.1).contains(&e.y) && self.thinning.keeps(e)
+    }
+
+    fn push(&mut self, event: &CdEvent) {
+        if !self.counts(event) {
+            return;
+        }
+        if let Some(from_us) = self.from_us {
+            self.add(event, from_us);
+        }
+        if self.history.len() == HISTORY {
+            let oldest = self.history.pop_front().map(|e| e.t_us);
+            self.forgotten_us = self.forgotten_us.max(oldest);
+        }
+        self.history.push_back(*event);
+    }
+
+    fn add(&mut self, event: &CdEvent, from_us: u64) {
+        if event.t_us < from_us {
+            return;
+        }
+        match PackedEvent::pack(event, from_us) {
+            Some(packed) if self.events.len() < MOST => {
+                self.in_order &= self.events.last().is_none_or(|last| *last <= packed);
+                self.events.push(packed);
+            }
+            _ => self.complete = false,
+        }
+    }
+
+    fn open(&mut self, from_us: u64) {
+        (self.from_us, self.in_order) = (Some(from_us), true);
+        self.complete = self
+            .forgotten_us
+            .is_none_or(|forgotten| forgotten < from_us);
+        self.events.clear();
+        let history = std::mem::take(&mut self.history);
+        history.iter().for_each(|event| self.add(event, from_us));
+        self.history = history;
+    }
+
+    fn close(&mut self) {
+        self.from_us = None;
+        self.events.clear();
+    }
+
+    /// What the camera saw until `until_us`, and how many events.
+    fn features(&mut self, until_us: u64) -> (CameraFeatures, u32) {
+        let Some(from_us) = self.from_us else {
+            return (CameraFeatures::default(), 0);
+        };
+        if !self.in_order {
+            self.events.sort_unstable();
+            self.in_order = true;
+        }
+        let end = until_us.saturating_sub(from_us);
+        let count = self.events.partition_point(|e| u64::from(e.t_us()) < end);
+        let estimate = self.estimator.estimate(&self.events[..count], 0);
+        (CameraFeatures::from(&estimate), count as u32)
+    }
+}
+
+/// Locates touches in the events of both cameras. With the window of a press it gives, at the end of that window, the bits of
+/// the analysis.
+#[derive(Debug, Clone)]
+pub struct PositionEstimator {
+    cameras: [CameraWindow; 2],
+    locator: FittedLocator,
+    outline: SkinOutline,
+}
+
+impl PositionEstimator {
+    /// With the settings and the locator of an analysis.
+    ///
+    /// # Errors
+    /// [`LocatorModelError`] if its locator cannot be rebuilt.
+    pub fn of(analysis: &Analysis) -> Result<Self, LocatorModelError> {
+        Ok(Self {
+            cameras: CameraId::ALL.map(|camera| CameraWindow::new(&analysis.settings, camera)),
+            locator: FittedLocator::of(analysis)?,
+            outline: analysis.rig.outline,
+        })
+    }
+
+    /// Adds the next events of a camera.
+    pub fn push(&mut self, camera: CameraId, events: &[CdEvent]) {
+        let window = &mut self.cameras[camera.index()];
+        events.iter().for_each(|event| window.push(event));
+    }
+
+    /// Opens a window that begins at these times of the cameras, µs; earlier events may have been pushed already.
+    pub fn open(&mut self, from_us: [u64; 2]) {
+        for (window, from_us) in self.cameras.iter_mut().zip(from_us) {
+            window.open(from_us);
+        }
+    }
+
+    /// Closes the window.
+    pub fn close(&mut self) {
+        self.cameras.iter_mut().for_each(CameraWindow::close);
+    }
+
+    /// The position by the events before these times of the cameras, µs.
+    #[must_use]
+    pub fn position(&mut self, until_us: [u64; 2]) -> Position {
+        let [one, two] = &mut self.cameras;
+        let seen = [one.features(until_us[0]), two.features(until_us[1])];
+        let (outcome, location) = self.locator.outcome(&self.outline, seen.map(|s| s.0));
+        Position {
+            outcome,
+            location,
+            events: seen.map(|s| s.1),
+            complete: self.cameras.iter().all(|c| c.complete),
+        }
+    }
+}

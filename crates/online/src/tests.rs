@@ -1,0 +1,203 @@
+//! The detector on planted streams: what it feels, and that slicing changes nothing.
+
+use proptest::prelude::*;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use skinrig_analysis::result::{ClockFit, ClockMethod};
+use skinrig_model::{CameraId, CdEvent, Polarity};
+use skinrig_statistics::seeded;
+
+use crate::model::{Pattern, TouchModel};
+use crate::regions::{REGIONS, region};
+use crate::{Detection, Detector, Felt};
+
+const IDLE_PER_S: f64 = 5_000.0;
+const TOUCH_PER_S: f64 = 20_000.0;
+
+fn clocks() -> [ClockFit; 2] {
+    let fit = |offset_us, drift_ppm| ClockFit {
+        method: ClockMethod::TimeBase,
+        offset_us,
+        drift_ppm,
+        drift_se_ppm: 0.0,
+        residual_rms_us: 0.0,
+        residual_max_us: 0.0,
+        n: 3,
+        rejected: 0,
+    };
+    [fit(12.6e6, 31.0), fit(5.2e6, -24.0)]
+}
+
+fn event(t_us: u64, x: u16, y: u16) -> CdEvent {
+    CdEvent {
+        t_us,
+        x,
+        y,
+        polarity: Polarity::from_bit(y & 1 == 1),
+    }
+}
+
+/// A touch at `place` is seen in 64 columns of both cameras, here from this one on.
+fn first_column(place: usize) -> u16 {
+    64 + 96 * place as u16
+}
+
+fn model() -> TouchModel {
+    let pattern = |place: usize| {
+        let mut counts = vec![0.0; REGIONS];
+        for x in first_column(place)..first_column(place) + 64 {
+            for y in 200..264 {
+                if let Some(region) = region(&event(0, x, y)) {
+                    counts[region] += 1.0 / (2.0 * 64.0 * 64.0);
+                }
+            }
+        }
+        let shares = |k: usize| {
+            let all = counts
+                .clone()
+                .into_iter()
+                .enumerate()
+                .map(move |(r, s)| (k, r, s));
+            all.filter(|s| s.2 > 0.0)
+        };
+        Pattern {
+            at: [place as f64, 0.0],
+            shares: shares(0).chain(shares(1)).collect(),
+        }
+    };
+    let idle = vec![IDLE_PER_S * 500e-6 / REGIONS as f64; REGIONS];
+    TouchModel {
+        idle: [idle.clone(), idle],
+        patterns: (0..5).map(pattern).collect(),
+        tail: Vec::new(),
+        longest_press: 800,
+        octaves: (-2, 4),
+    }
+}
+
+/// Two seconds of one camera, in order: idle, and a touch of 0.4 s from 1 s on whose tip moves in its first and last 0.1 s.
+fn stream(seed: u64, camera: CameraId, place: Option<usize>) -> Vec<CdEvent> {
+    let mut rng = seeded::generator(seed, camera.index() as u64);
+    let clock = clocks()[camera.index()];
+    let mut events = Vec::new();
+    let mut add = |rng: &mut Xoshiro256PlusPlus,
+                   from_us: f64,
+                   to_us: f64,
+                   per_s: f64,
+                   first: u16,
+                   width: usize,
+                   rows: (u16, usize)| {
+        for _ in 0..((to_us - from_us) * per_s * 1e-6) as u32 {
+            let unit = 0.5 * (seeded::signed_unit(rng) + 1.0);
+            let t_us = clock.camera_us(from_us + unit * (to_us - from_us)) as u64;
+            let x = first + seeded::index(rng, width) as u16;
+            events.push(event(t_us, x, rows.0 + seeded::index(rng, rows.1) as u16));
+        }
+    };
+    add(&mut rng, 0.0, 2e6, IDLE_PER_S, 0, 640, (0, 480));
+    if let Some(place) = place {
+        for from_us in [1.0e6, 1.3e6] {
+            add(
+                &mut rng,
+                from_us,
+                from_us + 0.1e6,
+                TOUCH_PER_S,
+                first_column(place),
+                64,
+                (200, 64),
+            );
+        }
+    }
+    events.sort_by_key(|e| (e.t_us, e.x, e.y));
+    events
+}
+
+/// Decisions on two streams of which the next slice has the camera and length that `next` says.
+fn run(
+    streams: &[Vec<CdEvent>; 2],
+    threshold: f64,
+    mut next: impl FnMut() -> (usize, usize),
+) -> Vec<Detection> {
+    let mut detector = Detector::new(&model(), &clocks(), threshold, 0).unwrap();
+    let mut at = [0, 0];
+    let mut found = Vec::new();
+    while (0..2).any(|k| at[k] < streams[k].len()) {
+        let (k, length) = next();
+        let end = (at[k] + length).min(streams[k].len());
+        let slice = &streams[k][at[k]..end];
+        at[k] += detector.push(CameraId::ALL[k], slice, |d| found.push(d));
+        // A stream that has ended delays nothing.
+        for k in (0..2).filter(|k| at[*k] == streams[*k].len()) {
+            detector.promise(CameraId::ALL[k], u64::MAX >> 20, |d| found.push(d));
+        }
+    }
+    detector.finish(|d| found.push(d));
+    assert!(
+        detector
+            .uncounted()
+            .iter()
+            .all(|u| *u == crate::Uncounted::default())
+    );
+    found
+}
+
+fn at_once(streams: &[Vec<CdEvent>; 2], threshold: f64) -> Vec<Detection> {
+    let mut k = 0;
+    run(streams, threshold, || {
+        k = 1 - k;
+        (k, usize::MAX / 2)
+    })
+}
+
+fn streams(seed: u64, place: Option<usize>) -> [Vec<CdEvent>; 2] {
+    CameraId::ALL.map(|camera| stream(seed, camera, place))
+}
+
+#[test]
+fn a_touch_is_felt_once_where_it_is() {
+    for place in 0..5 {
+        let found = at_once(&streams(7, Some(place)), 14.0);
+        let felt: Vec<Felt> = found.iter().map(|d| d.felt).collect();
+        assert_eq!(felt, [Felt::Onset, Felt::Release], "{found:?}");
+        let [onset, release] = found[..] else {
+            panic!()
+        };
+        assert_eq!(onset.near_mm, [place as f64, 0.0]);
+        assert!((1_000_000..1_003_000).contains(&onset.host_us), "{onset:?}");
+        assert!(
+            (999_000..=onset.host_us).contains(&onset.since_us),
+            "{onset:?}"
+        );
+        assert!(
+            (1_400_000..1_425_000).contains(&release.host_us),
+            "{release:?}"
+        );
+        assert!(onset.llr >= 14.0);
+    }
+}
+
+#[test]
+fn an_idle_skin_is_not_felt() {
+    assert_eq!(at_once(&streams(8, None), 14.0), []);
+    let weak = at_once(&streams(8, None), 4.0);
+    assert!(weak.iter().any(|d| d.felt == Felt::Withdrawn), "{weak:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn slicing_changes_nothing(
+        seed in 0u64..1000, slices in 0u64..1000, longest in prop_oneof![Just(1usize), 2usize..2000],
+    ) {
+        let streams = streams(seed, Some((seed % 5) as usize));
+        // Low, so that there are false alarms too.
+        let expected = at_once(&streams, 7.0);
+        let mut rng = seeded::generator(slices, 9);
+        let found = run(&streams, 7.0, || {
+            (seeded::index(&mut rng, 2), 1 + seeded::index(&mut rng, longest))
+        });
+        let bits = |all: &[Detection]| -> Vec<_> {
+            all.iter().map(|d| (d.felt, d.host_us, d.since_us, d.llr.to_bits())).collect()
+        };
+        prop_assert_eq!(bits(&found), bits(&expected));
+    }
+}
