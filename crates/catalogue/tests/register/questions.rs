@@ -309,4 +309,18 @@ pub(crate) fn measure(catalogue: &mut Catalogue, lab: &Lab, database: &str) -> S
 fn ten_thousand_sessions_in_sqlite() {
     let lab = Lab::with_sessions(0);
     println!("{}", measure(&mut lab.open(), &lab, "SQLite"));
+    // Read from files, without results.
+    let lab = Lab::with_sessions(300);
+    let mut catalogue = lab.open();
+    let since = Instant::now();
+    assert_eq!(
+        catalogue
+            .refresh(lab.path(), false)
+            .unwrap()
+            .registered
+            .len(),
+        300
+    );
+    let rate = 300.0 / since.elapsed().as_secs_f64();
+    println!("SQLite: 300 recorded sessions, read and registered: {rate:.0}/s");
 }
