@@ -32,7 +32,7 @@ fn results(session_id: &str, rmse_mm: f64, variant: Option<&str>) -> String {
                 "standard_errors": [null, 0.1], "rmse_before_mm": 4.0, "rmse_after_mm": 2.0, "n": 9}},
             "scored": {{"rmse_mm": {{"value": {rmse_mm}, "low": 1.0, "high": 2.0, "n": 8}}}}}},
           "provenance": {{"session_id": "{session_id}", "results_hash": "abc", "variant": {variant}}},
-          "valid": true}}"#
+          "summary": {{}}, "valid": true}}"#
     )
 }
 

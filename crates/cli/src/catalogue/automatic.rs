@@ -1,10 +1,10 @@
 //! Registers a session that a command has just recorded, analysed or tagged. Best effort: the command never fails because of the
-//! catalogue, and waits at most [`WAIT`], when the robot is at rest.
+//! catalogue, and waits at most [`WAIT`], when the robot is at rest. Lists a folder from its catalogue.
 
 use std::path::Path;
 use std::time::Duration;
 
-use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError};
+use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError, ListedSession};
 
 use crate::paths::folder_of;
 
@@ -28,4 +28,14 @@ fn try_register(session: &Path) -> Result<(), CatalogueError> {
     // A session that cannot be read is an entry, too.
     catalogue.register(&[session.to_owned()])?;
     catalogue.close()
+}
+
+/// The sessions of a folder from its embedded catalogue; `None` if only the files have the whole answer.
+pub(crate) fn list(folder: &Path) -> Option<Vec<ListedSession>> {
+    let address = Address::of_folder(folder);
+    let mut catalogue = Catalogue::open(address, Access::Read, WAIT).ok()?;
+    let listed = catalogue.list(folder).ok()?;
+    // What was read does not depend on it.
+    let _ = catalogue.close();
+    listed
 }
