@@ -109,8 +109,8 @@ fn answers_are_those_of_the_entries() {
     assert_eq!(answer.rows.len(), expected.len());
     for (row, ((prototype, kind), all)) in answer.rows.iter().zip(expected) {
         assert_eq!((text(&row[0]), text(&row[1])), (*prototype, *kind));
-        assert_eq!(row[2], Value::Integer(all.len() as i64));
-        assert!((real(&row[3]) - mean(all)).abs() < 1e-12);
+        assert_eq!(row[3], Value::Integer(all.len() as i64));
+        assert!((real(&row[4]) - mean(all)).abs() < 1e-12);
     }
 
     // Drift of camera 1 over 2025, by month and serial number.

@@ -241,6 +241,14 @@ fn a_run_does_without_a_catalogue() {
         status.contains("unreadable  b.session.sqlite: "),
         "{status}"
     );
+    std::fs::write(
+        lab.path("s").join("prototypes.yaml"),
+        "skinrig_prototypes: 1\nprototypes: [{nam: a}]\n",
+    )
+    .unwrap();
+    skinrig(&["catalogue", "register", &s])
+        .code(2)
+        .expect_stderr(&["nam", "did you mean"]);
     skinrig(&["catalogue", "query", "devises"])
         .code(2)
         .expect_stderr(&["devices"]);
