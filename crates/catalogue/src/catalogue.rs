@@ -47,6 +47,9 @@ pub struct Registration {
     pub forgotten: Vec<String>,
     /// Number of prototypes declared in the folder; `None` if they were not read.
     pub prototypes: Option<usize>,
+    /// Findings in the file of prototypes; the catalogue then keeps those that it has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prototypes_problem: Option<String>,
 }
 
 /// A session file that was read, or not.
@@ -177,9 +180,12 @@ impl Catalogue {
     /// Registers what is stale in a folder, forgets what is gone, and reads its file of prototypes. `all`: reads every session again.
     ///
     /// # Errors
-    /// As [`register`](Self::register), and for an invalid file of prototypes.
+    /// As [`register`](Self::register).
     pub fn refresh(&mut self, folder: &Path, all: bool) -> Result<Registration, CatalogueError> {
-        let prototypes = Prototypes::of_folder(folder)?;
+        let (prototypes, prototypes_problem) = match Prototypes::of_folder(folder) {
+            Ok(found) => (Some(found), None),
+            Err(e) => (None, Some(e.to_string())),
+        };
         let store = self.address.store_of(folder)?;
         let files = Folder::list(folder)?;
         let compared = status::compare(&mut self.db, &self.place, &store, &files);
@@ -190,14 +196,18 @@ impl Catalogue {
             .partition(|s| s.why == Staleness::Gone);
         let mut done = Registration {
             forgotten: gone.into_iter().map(|s| s.file).collect(),
-            prototypes: Some(prototypes.len()),
+            prototypes: prototypes.as_ref().map(Vec::len),
+            prototypes_problem,
             ..Registration::default()
         };
         self.transaction("forgetting files", async |db| {
             for name in &done.forgotten {
                 write::forget(db, &store, name).await?;
             }
-            write::prototypes(db, &store, &prototypes).await
+            match &prototypes {
+                Some(all) => write::prototypes(db, &store, all).await,
+                None => Ok(()),
+            }
         })?;
         let names: Vec<String> = match all {
             true => files.sessions.clone(),

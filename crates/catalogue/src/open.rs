@@ -38,7 +38,9 @@ pub(crate) async fn open(
             if !is_there && access == Access::Read {
                 return Err(CatalogueError::Missing { place });
             }
-            file(path, access, wait).await?
+            let mut db = file(path, access, wait).await?;
+            check_schema(&mut db, &place).await?;
+            db
         }
         #[cfg(feature = "postgres")]
         Address::Server(url) => server(url).await?,
@@ -94,6 +96,7 @@ async fn file(path: &Path, access: Access, wait: Duration) -> Result<Db, Catalog
             .foreign_keys(true)
             .busy_timeout(wait)
             .pragma("cache_size", "-16384")
+            .pragma("trusted_schema", "OFF")
             .row_buffer_size(1024)
             .thread_name(|_| "catalogue-sqlite".to_owned());
         match options.connect().await {
@@ -108,6 +111,35 @@ async fn file(path: &Path, access: Access, wait: Duration) -> Result<Db, Catalog
             }
         }
     }
+}
+
+/// Rejects what a catalogue never has: views and triggers of an untrusted file would run when it is read or written, for unlimited
+/// time. The SQLite client panics on names that are not UTF-8.
+async fn check_schema(db: &mut Db, place: &str) -> Result<(), CatalogueError> {
+    let sql = "SELECT type IN ('table', 'index') AND rootpage > 0, hex(coalesce(sql, '')) FROM sqlite_schema";
+    let found = db.fetch(sql, &[]).await;
+    let found = found.map_err(|e| CatalogueError::sql(place, "reading its schema", e))?;
+    let foreign = |found: &str| CatalogueError::Foreign {
+        place: place.to_owned(),
+        found: found.to_owned(),
+    };
+    for row in &found.rows {
+        if row[0].as_integer() != Some(1) {
+            return Err(foreign("a file with views or triggers"));
+        }
+        let bytes = row[1].as_text().map(bytes_of).unwrap_or_default();
+        if std::str::from_utf8(&bytes).is_err() {
+            return Err(foreign("a schema that is not UTF-8"));
+        }
+    }
+    Ok(())
+}
+
+/// The bytes of hexadecimal digits.
+fn bytes_of(hex: &str) -> Vec<u8> {
+    let pairs = hex.as_bytes().chunks(2);
+    let byte = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
+    pairs.filter_map(byte).collect()
 }
 
 #[cfg(feature = "postgres")]

@@ -106,6 +106,9 @@ pub struct CalibrationEntry {
 struct Document {
     analysis: Analysis,
     provenance: Provenance,
+    /// Lists of many sessions read it; without it the results are those of an older version.
+    #[serde(rename = "summary")]
+    _summary: serde::de::IgnoredAny,
     valid: bool,
 }
 

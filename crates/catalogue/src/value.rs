@@ -99,9 +99,10 @@ impl From<Option<f64>> for Bound {
     }
 }
 
+/// PostgreSQL has no zero character: it becomes U+FFFD, the replacement character.
 impl From<&str> for Bound {
     fn from(value: &str) -> Self {
-        Self::Text(Some(value.to_owned()))
+        Self::Text(Some(value.replace('\0', "\u{fffd}")))
     }
 }
 
@@ -113,7 +114,7 @@ impl From<&String> for Bound {
 
 impl From<Option<&str>> for Bound {
     fn from(value: Option<&str>) -> Self {
-        Self::Text(value.map(str::to_owned))
+        value.map_or(Self::Text(None), Self::from)
     }
 }
 

@@ -1,15 +1,16 @@
 //! `skinrig prototypes`: results of each prototype over all sessions of a folder.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use skinrig_analysis::result::Estimate;
+use skinrig_catalogue::{EstimateEntry, ListedSession, OfficialResult};
 use skinrig_recorder::{SessionState, SessionSummary, list};
 use skinrig_report::Variant;
 use skinrig_text::{Blocks, Column, Table, sparkline};
 
-use crate::analyses::summary;
+use crate::analyses::{SummaryError, summary};
 use crate::args::PrototypesArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::sessions::{copies, originals};
@@ -56,20 +57,27 @@ struct Prototype {
     series: Vec<Series>,
 }
 
+/// A session before it is grouped.
+struct Entry {
+    prototype: String,
+    protocol: String,
+    rig_kind: String,
+    point: Point,
+}
+
 /// Lists the prototypes of a folder.
 ///
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read, or has no session of the named prototype.
 pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
-    let mut sessions = list(&args.folder).map_err(Failure::session)?;
+    let mut entries = entries(&args.folder, args.analysis.as_deref())?;
     if let Some(prototype_id) = &args.prototype {
-        crate::sessions::of_prototype(&args.folder, prototype_id)?;
-        sessions.retain(|s| s.prototype() == Some(prototype_id));
+        entries.retain(|e| e.prototype == *prototype_id);
+        if entries.is_empty() {
+            crate::sessions::of_prototype(&args.folder, prototype_id)?;
+        }
     }
-    let all = gather(&sessions, args.analysis.as_deref());
-    for copy in copies(&sessions) {
-        errln!("note: {copy}");
-    }
+    let all = group(entries);
     if json {
         crate::terminal::print_json(&serde_json::to_value(&all).map_err(Failure::internal)?);
     } else if all.is_empty() {
@@ -84,16 +92,77 @@ pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
 ///
 /// # Errors
 /// As [`prototypes`].
-pub(crate) fn document(folder: &std::path::Path) -> Result<serde_json::Value, Failure> {
+pub(crate) fn document(folder: &Path) -> Result<serde_json::Value, Failure> {
     let sessions = list(folder).map_err(Failure::session)?;
-    serde_json::to_value(gather(&sessions, None)).map_err(Failure::internal)
+    serde_json::to_value(group(read(&sessions, None))).map_err(Failure::internal)
 }
 
-/// Groups sessions by prototype, then by protocol and kind of rig; keeps their order.
-fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype> {
-    type Groups = BTreeMap<(String, String), Vec<Point>>;
-    let mut all: BTreeMap<String, (usize, String, Groups)> = BTreeMap::new();
-    for session in originals(sessions) {
+/// The sessions of a folder, oldest first: from its catalogue if that has all of them as they are, else from the files.
+fn entries(folder: &Path, analysis: Option<&str>) -> Result<Vec<Entry>, Failure> {
+    if analysis.is_none()
+        && let Some(listed) = crate::catalogue::automatic::list(folder)
+    {
+        return Ok(listed
+            .into_iter()
+            .map(|l| from_catalogue(folder, l))
+            .collect());
+    }
+    let sessions = list(folder).map_err(Failure::session)?;
+    for copy in copies(&sessions) {
+        errln!("note: {copy}");
+    }
+    Ok(read(&sessions, analysis))
+}
+
+/// RMSE of an analysis, or why it has none that can be used.
+fn usable(is_valid: bool, rmse_mm: Estimate) -> (Option<Estimate>, Option<String>) {
+    match rmse_mm.value {
+        _ if !is_valid => (None, Some("INVALID: do not use".to_owned())),
+        None => (None, Some("no scored press located".to_owned())),
+        Some(_) => (Some(rmse_mm), None),
+    }
+}
+
+fn from_catalogue(folder: &Path, listed: ListedSession) -> Entry {
+    let (rmse_mm, without) = match listed.official {
+        None => (None, Some(SummaryError::NotAnalysed.to_string())),
+        Some(OfficialResult { is_valid, rmse_mm }) => {
+            let EstimateEntry {
+                value,
+                low,
+                high,
+                n,
+            } = rmse_mm;
+            let rmse_mm = Estimate {
+                value,
+                low,
+                high,
+                n,
+            };
+            usable(is_valid, rmse_mm)
+        }
+    };
+    // Shown with the results alone.
+    let overrides = listed.official.map(|_| listed.overrides);
+    Entry {
+        prototype: listed.prototype,
+        protocol: listed.protocol_name,
+        rig_kind: listed.rig_kind,
+        point: Point {
+            session: folder.join(listed.file),
+            started_at: listed.started_at,
+            tags: listed.tags,
+            rmse_mm,
+            without,
+            variant: None,
+            overrides: overrides.unwrap_or_default(),
+        },
+    }
+}
+
+/// Reads the results of sessions, without copies of the same session; keeps their order.
+fn read(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Entry> {
+    let entry = |session: &SessionSummary| {
         let SessionState::Readable {
             session_id,
             started_at,
@@ -104,32 +173,43 @@ fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype>
             ..
         } = &session.state
         else {
-            continue;
+            return None;
         };
-        let (count, last, groups) = all.entry(prototype.clone()).or_default();
-        *count += 1;
-        last.clone_from(started_at);
         let found = summary(&session.path, session_id, analysis);
         let (rmse_mm, without) = match &found {
-            Ok(found) if !found.valid => (None, Some("INVALID: do not use".to_owned())),
-            Ok(found) if found.rmse_mm.value.is_none() => {
-                (None, Some("no scored press located".to_owned()))
-            }
-            Ok(found) => (Some(found.rmse_mm), None),
+            Ok(found) => usable(found.valid, found.rmse_mm),
             Err(why) => (None, Some(why.to_string())),
         };
         let (variant, overrides) =
             found.map_or_else(|_| (None, Vec::new()), |f| (f.variant, f.overrides));
-        let key = (protocol_name.clone(), rig_kind.clone());
-        groups.entry(key).or_default().push(Point {
-            session: session.path.clone(),
-            started_at: started_at.clone(),
-            tags: annotations.tags.iter().cloned().collect(),
-            rmse_mm,
-            without,
-            variant,
-            overrides,
-        });
+        Some(Entry {
+            prototype: prototype.clone(),
+            protocol: protocol_name.clone(),
+            rig_kind: rig_kind.clone(),
+            point: Point {
+                session: session.path.clone(),
+                started_at: started_at.clone(),
+                tags: annotations.tags.iter().cloned().collect(),
+                rmse_mm,
+                without,
+                variant,
+                overrides,
+            },
+        })
+    };
+    originals(sessions).into_iter().filter_map(entry).collect()
+}
+
+/// Groups sessions by prototype, then by protocol and kind of rig; keeps their order.
+fn group(entries: Vec<Entry>) -> Vec<Prototype> {
+    type Groups = BTreeMap<(String, String), Vec<Point>>;
+    let mut all: BTreeMap<String, (usize, String, Groups)> = BTreeMap::new();
+    for entry in entries {
+        let (count, last, groups) = all.entry(entry.prototype).or_default();
+        *count += 1;
+        last.clone_from(&entry.point.started_at);
+        let key = (entry.protocol, entry.rig_kind);
+        groups.entry(key).or_default().push(entry.point);
     }
     let series = |((protocol, rig_kind), points): ((String, String), Vec<Point>)| {
         let usable = || points.iter().filter_map(|p| p.rmse_mm);

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError};
-use sqlx::ConnectOptions;
 use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{ConnectOptions, Connection};
 
 use crate::support::{Lab, WAIT};
 
@@ -25,6 +25,7 @@ fn execute(file: &std::path::Path, statements: &[&'static str]) {
         for statement in statements {
             sqlx::query(*statement).execute(&mut conn).await.unwrap();
         }
+        conn.close().await.unwrap();
     });
 }
 
@@ -64,6 +65,33 @@ fn only_a_catalogue_is_opened() {
         open(&lab, Access::Write),
         Err(CatalogueError::Foreign { .. })
     ));
+}
+
+#[test]
+fn a_catalogue_that_would_run_code_is_rejected() {
+    for statement in [
+        "CREATE TRIGGER t AFTER INSERT ON session BEGIN DELETE FROM tag; END",
+        "CREATE VIEW v AS SELECT 1",
+        "CREATE TABLE x (\"a\u{fffd}\" TEXT)",
+    ] {
+        let lab = Lab::with_sessions(1);
+        open(&lab, Access::Write).unwrap().close().unwrap();
+        execute(&lab.file(), &[statement]);
+        // Text that is not UTF-8 in a name.
+        let mut bytes = std::fs::read(lab.file()).unwrap();
+        let mark = "\u{fffd}".as_bytes();
+        while let Some(at) = bytes.windows(3).position(|w| w == mark) {
+            bytes[at..at + 3].fill(0xff);
+        }
+        std::fs::write(lab.file(), &bytes).unwrap();
+        for access in [Access::Read, Access::Write] {
+            let found = open(&lab, access);
+            assert!(
+                matches!(found, Err(CatalogueError::Foreign { .. })),
+                "{statement}: {found:?}"
+            );
+        }
+    }
 }
 
 #[test]

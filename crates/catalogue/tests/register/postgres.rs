@@ -98,6 +98,30 @@ fn an_unreachable_server_is_an_error_without_its_password() {
 }
 
 #[test]
+fn a_reader_asks_and_does_not_register() {
+    let Some(server) = Server::start() else {
+        return;
+    };
+    let lab = Lab::with_sessions(1);
+    server.open().unwrap().refresh(lab.path(), false).unwrap();
+    server.execute(&[
+        "CREATE ROLE reader LOGIN",
+        "GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader",
+    ]);
+    let url = server.url("postgres").replace("skinrig@", "reader@");
+    let address = Address::parse(url.as_ref());
+    for access in [Access::Read, Access::Write] {
+        let mut reader = Catalogue::open(address.clone(), access, WAIT).unwrap();
+        assert_eq!(reader.status(lab.path()).unwrap().current, 1);
+        assert_eq!(questions::ask(&mut reader, "rigs", &[]).rows.len(), 1);
+        let refused = reader.refresh(lab.path(), true).unwrap_err();
+        assert!(matches!(refused, CatalogueError::Sql { .. }), "{refused:?}");
+    }
+    let central = server.open().unwrap().status(lab.path()).unwrap();
+    assert_eq!((central.current, central.stale.len()), (1, 0));
+}
+
+#[test]
 #[ignore = "measures; a minute"]
 fn ten_thousand_sessions_in_postgresql() {
     let Some(server) = Server::start() else {

@@ -120,6 +120,13 @@ impl Server {
         self.run("createdb", words);
     }
 
+    /// Executes statements as the owner.
+    pub(crate) fn execute(&self, statements: &[&'static str]) {
+        for statement in statements {
+            self.rows("postgres", statement);
+        }
+    }
+
     /// Every row of every table of a database but the migrations, as text, sorted.
     pub(crate) fn dump(&self, database: &str) -> String {
         let mut dump = String::new();

@@ -32,7 +32,7 @@ fn results(session_id: &str, rmse_mm: f64, variant: Option<&str>) -> String {
                 "standard_errors": [null, 0.1], "rmse_before_mm": 4.0, "rmse_after_mm": 2.0, "n": 9}},
             "scored": {{"rmse_mm": {{"value": {rmse_mm}, "low": 1.0, "high": 2.0, "n": 8}}}}}},
           "provenance": {{"session_id": "{session_id}", "results_hash": "abc", "variant": {variant}}},
-          "valid": true}}"#
+          "summary": {{}}, "valid": true}}"#
     )
 }
 
@@ -267,8 +267,14 @@ fn prototypes_of_the_folder_are_read() {
     );
     assert_eq!(found, ["a"]);
     std::fs::write(&file, text.replace("parent: a", "parent: c")).unwrap();
-    let error = lab.open().refresh(lab.path(), false).unwrap_err();
-    assert!(error.to_string().contains("not declared"), "{error}");
+    // A mistake in it stops nothing else.
+    common::sealed(&lab.session(0), 3);
+    let done = refresh(&lab);
+    let problem = done.prototypes_problem.unwrap();
+    assert!(problem.contains("not declared"), "{problem}");
+    assert_eq!(done.registered.len(), 1);
+    let kept = column(&lab.file(), "SELECT count(*) FROM prototype");
+    assert_eq!(kept, ["2"]);
     std::fs::remove_file(&file).unwrap();
     refresh(&lab);
     assert_eq!(column(&lab.file(), "SELECT count(*) FROM prototype"), ["0"]);

@@ -18,7 +18,6 @@ pub(super) fn failure(error: CatalogueError) -> Failure {
         CatalogueError::Io { .. } | CatalogueError::Sql { .. } | CatalogueError::Busy { .. } => {
             Failure::internal(error)
         }
-        CatalogueError::Prototypes(found) => Failure::findings(found),
         _ => Failure::input(error),
     }
 }

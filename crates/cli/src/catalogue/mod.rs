@@ -34,7 +34,18 @@ fn rebuild(args: &FolderArgs, json: bool) -> Outcome {
     let address = args.catalogue.of_folder(&args.folder);
     let (catalogue, done) = Catalogue::rebuild(address, &args.folder, WAIT).map_err(failure)?;
     finish(catalogue, &done, args.nights.as_deref(), json)?;
-    Ok(Exit::Ok)
+    Ok(exit_of(&done))
+}
+
+/// Exit code after a whole folder: files that are no sessions are usual there, mistakes in the file of prototypes are not.
+fn exit_of(done: &Registration) -> Exit {
+    match &done.prototypes_problem {
+        None => Exit::Ok,
+        Some(problem) => {
+            errln!("{problem}");
+            Exit::Input
+        }
+    }
 }
 
 fn status(args: &StatusArgs, json: bool) -> Outcome {
@@ -58,7 +69,7 @@ fn register(args: &RegisterArgs, json: bool) -> Outcome {
         let mut catalogue = open(args.catalogue.of_folder(folder))?;
         let done = catalogue.refresh(folder, false).map_err(failure)?;
         finish(catalogue, &done, args.nights.as_deref(), json)?;
-        return Ok(Exit::Ok);
+        return Ok(exit_of(&done));
     }
     let folder = one_folder(&args.sessions)?;
     let mut catalogue = open(args.catalogue.of_folder(&folder))?;

@@ -1,8 +1,8 @@
 //! Contents of a sessions folder: prototypes, tags, remarks, and the catalogue of all.
 
 use serde_json::{Value, json};
-use sqlx::ConnectOptions;
 use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{ConnectOptions, Connection};
 
 use crate::support::{Lab, SMALL, files, only, skinrig, text};
 
@@ -153,9 +153,17 @@ fn the_catalogue_has_the_same_answers(s: &str, prototypes: &Value) {
     }
     let drift = ask(&["clock-drift"]);
     assert_eq!(drift.len(), 2, "two simulated cameras: {drift:?}");
+    // The list of prototypes comes from the catalogue, and is that of the files.
+    let file = std::path::Path::new(s).join("catalogue.sqlite");
+    let list = || skinrig(&["prototypes", s, "--json"]).code(0).json();
+    assert_eq!(list(), *prototypes);
+    change(&file, "UPDATE analysis SET rmse_mm = 99");
+    assert_eq!(list()[1]["series"][0]["last"]["value"], json!(99.0));
+    skinrig(&["catalogue", "rebuild", s]).code(0);
     // Rebuilt from nothing: the same answers.
     let before = ask(&["devices"]);
-    std::fs::remove_file(std::path::Path::new(s).join("catalogue.sqlite")).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    assert_eq!(list(), *prototypes);
     skinrig(&["catalogue", "query", "devices", "--folder", s])
         .code(2)
         .expect_stderr(&["skinrig catalogue rebuild"]);
@@ -167,6 +175,19 @@ fn the_catalogue_has_the_same_answers(s: &str, prototypes: &Value) {
         .code(0)
         .out;
     assert!(words.contains("sim-00000001-c1"), "{words}");
+}
+
+/// Executes a statement on a catalogue.
+fn change(file: &std::path::Path, statement: &'static str) {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let options = SqliteConnectOptions::new().filename(file);
+        let mut conn = options.connect().await.unwrap();
+        sqlx::query(statement).execute(&mut conn).await.unwrap();
+        conn.close().await.unwrap();
+    });
 }
 
 /// A run neither waits for a catalogue that is in use nor fails because of one that cannot be used; its session is then stale.
@@ -220,6 +241,14 @@ fn a_run_does_without_a_catalogue() {
         status.contains("unreadable  b.session.sqlite: "),
         "{status}"
     );
+    std::fs::write(
+        lab.path("s").join("prototypes.yaml"),
+        "skinrig_prototypes: 1\nprototypes: [{nam: a}]\n",
+    )
+    .unwrap();
+    skinrig(&["catalogue", "register", &s])
+        .code(2)
+        .expect_stderr(&["nam", "did you mean"]);
     skinrig(&["catalogue", "query", "devises"])
         .code(2)
         .expect_stderr(&["devices"]);

@@ -66,6 +66,12 @@ fn json_keys_are_stable() {
     insta::assert_snapshot!("tag", shape(&tag));
     insta::assert_snapshot!("sessions", shape(&json(&["sessions", &s])));
     insta::assert_snapshot!("prototypes", shape(&json(&["prototypes", &s])));
+    let status = json(&["catalogue", "status", &s]);
+    insta::assert_snapshot!("catalogue_status", shape(&status));
+    let registered = json(&["catalogue", "register", &s]);
+    insta::assert_snapshot!("catalogue_register", shape(&registered));
+    let answer = json(&["catalogue", "query", "rigs", "--folder", &s]);
+    insta::assert_snapshot!("catalogue_query", shape(&answer));
     insta::assert_snapshot!("watch", shape(&json(&["watch", &session, "--once"])));
     insta::assert_snapshot!(
         "show",
@@ -136,6 +142,9 @@ fn without_a_terminal_output_is_plain_lines() {
         vec!["export", &session, "--to", "all", "--out", &lab.text("e")],
         vec!["tag", &session, "good", "--note", "warm"],
         vec!["prototypes", &s, "--prototype", "test skin"],
+        vec!["catalogue", "status", &s],
+        vec!["catalogue", "query", "devices", "--folder", &s],
+        vec!["catalogue", "query"],
         vec!["watch", &session],
         vec!["schema"],
         vec!["no-such-command"],
