@@ -1,7 +1,5 @@
 //! True digits of a planted session.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 use skinrig_analysis::digits::{MOST, digits};
 use skinrig_planted::grid::session;
 
