@@ -248,3 +248,21 @@ fn sessions_that_start_in_the_same_second_get_files_of_their_own() {
         skinrig(&["verify", &text(&session)]).code(0);
     }
 }
+
+#[test]
+fn digits_are_printed_below_the_answer_and_listed_in_json() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let shown = skinrig(&["analyze", &session, "--digits=2"]).code(0).out;
+    for expected in ["true digits", "fewest digits", "2 repetitions"] {
+        assert!(shown.contains(expected), "{shown}");
+    }
+    let json = skinrig(&["--json", "analyze", &session, "--digits=2"])
+        .code(0)
+        .out;
+    let document: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(document["digits"]["repetitions"], 2);
+    let figures = document["digits"]["figures"].as_array().unwrap();
+    assert!(figures.len() > 100, "{}", figures.len());
+    skinrig(&["analyze", &session, "--digits=0"]).code(2);
+}
