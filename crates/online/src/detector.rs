@@ -155,6 +155,8 @@ pub(crate) struct Core {
     pub(crate) touch: Touch,
     places: Vec<[f64; 2]>,
     threshold: i64,
+    /// Slots after which an uncertain touch is none.
+    longest_press: i64,
     touching: bool,
     /// Evidence of the touch that is not certain yet.
     onset: Option<Best>,
@@ -173,6 +175,7 @@ impl Core {
             touch: Touch::new(model),
             places: model.patterns.iter().map(|p| p.at).collect(),
             threshold: fixed(threshold).max(1),
+            longest_press: model.longest_press,
             touching: false,
             onset: None,
         }
@@ -205,8 +208,12 @@ impl Core {
                 if best.sum >= CERTAIN * self.threshold {
                     self.touching = true;
                     self.onset = Some(best);
-                } else if best.sum < self.threshold / WITHDRAWN {
+                } else if best.sum < self.threshold / WITHDRAWN
+                    || slot - self.touch.begun() > self.longest_press
+                {
+                    // Few events add up to nothing certain for as long as a press lasts: another one may come.
                     self.onset = None;
+                    self.bank.restart();
                     each(self.detection(Felt::Withdrawn, slot, best));
                 }
             }

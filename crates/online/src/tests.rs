@@ -176,6 +176,32 @@ fn a_touch_is_felt_once_where_it_is() {
 }
 
 #[test]
+fn an_uncertain_touch_ends_after_the_longest_press() {
+    let thin: [Vec<CdEvent>; 2] =
+        streams(9, Some(2)).map(|all| all.into_iter().step_by(1500).collect());
+    let model = model().thinned(1.0 / 1500.0);
+    let mut detector = Detector::new(&model, &clocks(), 9.0, 0).unwrap();
+    let mut found = Vec::new();
+    let mut at = [0, 0];
+    while (0..2).any(|k| at[k] < thin[k].len()) {
+        for (k, camera) in CameraId::ALL.into_iter().enumerate() {
+            at[k] += detector.push(camera, &thin[k][at[k]..], |d| found.push(d));
+            let next = thin[k].get(at[k]).map_or(u64::MAX >> 20, |e| e.t_us);
+            detector.promise(camera, next, |d| found.push(d));
+        }
+    }
+    for _ in 0..20 {
+        for camera in CameraId::ALL {
+            detector.promise(camera, u64::MAX >> 20, |d| found.push(d));
+        }
+    }
+    let felt: Vec<Felt> = found.iter().map(|d| d.felt).collect();
+    assert_eq!(felt[..2], [Felt::Onset, Felt::Withdrawn], "{found:?}");
+    let lasted_us = found[1].host_us - found[0].host_us;
+    assert!(lasted_us <= 401_000, "{lasted_us}");
+}
+
+#[test]
 fn an_idle_skin_is_not_felt() {
     assert_eq!(at_once(&streams(8, None), 14.0), []);
     let weak = at_once(&streams(8, None), 4.0);

@@ -1,7 +1,8 @@
 //! Measures the detector on recorded sessions, against a detector that knows place and template.
 //!
-//! `cargo run --release -p skinrig-online --example measure -- RATE FACTOR SESSION...`: for this rate of false alarms per second, and
-//! one in so many events.
+//! `cargo run --release -p skinrig-online --example measure -- RATES FACTOR SESSION...`: for these rates of false alarms per second
+//! (`0.13`, or `1,0.13,0.01` for a receiver operating characteristic), and one in so many events. The first rate is compared with
+//! the bound, unless `SKINRIG_NO_BOUND` is set.
 #![expect(clippy::print_stdout, reason = "its output is its purpose")]
 
 mod clairvoyant;
@@ -103,7 +104,27 @@ fn detect(
     Ok(found)
 }
 
-fn measure(path: &Path, rate: f64, factor: u64, bound: bool) -> Result<Delays, Box<dyn Error>> {
+/// What a threshold gives.
+fn print_score(limit: f64, presses: usize, score: &DetectionScore) {
+    let Some((per_s, (low, high))) = score.false_alarms_per_s() else {
+        return;
+    };
+    let mut delays: Vec<f64> = score.delays_ms.iter().map(|d| d.1).collect();
+    delays.sort_by(f64::total_cmp);
+    println!(
+        "  {limit:5.2} nats: {} false alarms in {:.0} s, {per_s:.4}/s [{low:.4}, {high:.4}]; {} of {presses} presses felt, {} missed, \
+         {} alarmed; median {:.1} ms, p99 {:.1} ms",
+        score.false_alarms,
+        score.at_risk_s,
+        delays.len(),
+        score.missed,
+        score.alarmed,
+        quantile(&delays, 0.5),
+        quantile(&delays, 0.99)
+    );
+}
+
+fn measure(path: &Path, rates: &[f64], factor: u64, bound: bool) -> Result<Delays, Box<dyn Error>> {
     let aligned = Session::open(path, AnalysisOptions::default())?
         .read_input()?
         .align();
@@ -113,27 +134,25 @@ fn measure(path: &Path, rate: f64, factor: u64, bound: bool) -> Result<Delays, B
     let model = model.thinned(1.0 / factor as f64);
     let keep = |c: CameraId, e: &CdEvent| keeps(factor, c, e);
     let idle = IdleStatistic::measure(&model, &training, &aligned.events, keep)?;
-    let limit = idle.threshold(rate);
-    let found = detect(&aligned, &training, &model, limit, factor)?;
-    let presses = ScoredPress::of(&analysis);
-    let mut score = DetectionScore::new(&found, &presses);
     println!(
-        "{}: {} places, idle {:.0} events/s, threshold {limit:.2} nats from {:.0} s idle",
+        "{}: {} places, idle {:.0} events/s, learnt from {:.0} s idle",
         path.display(),
         model.places(),
         model.idle_per_s(),
         idle.seconds()
     );
-    if let Some((per_s, (low, high))) = score.false_alarms_per_s() {
-        println!(
-            "  false alarms {} in {:.0} s: {per_s:.3}/s [{low:.3}, {high:.3}]; presses {}, alarmed {}, missed {}",
-            score.false_alarms,
-            score.at_risk_s,
-            presses.len(),
-            score.alarmed,
-            score.missed
-        );
+    let presses = ScoredPress::of(&analysis);
+    let mut scores = Vec::new();
+    for rate in rates {
+        let limit = idle.threshold(*rate);
+        let found = detect(&aligned, &training, &model, limit, factor)?;
+        let score = DetectionScore::new(&found, &presses);
+        print_score(limit, presses.len(), &score);
+        scores.push((*rate, score));
     }
+    let Some((rate, mut score)) = scores.into_iter().next() else {
+        return Ok(Delays::default());
+    };
     let mut delays = Delays {
         online: score.delays_ms.iter().map(|d| d.1).collect(),
         ..Delays::default()
@@ -201,13 +220,14 @@ fn compare(
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [rate, factor, sessions @ ..] = &args[..] else {
-        return Err("expected RATE FACTOR SESSION...".into());
+    let [rates, factor, sessions @ ..] = &args[..] else {
+        return Err("expected RATES FACTOR SESSION...".into());
     };
     let bound = std::env::var_os("SKINRIG_NO_BOUND").is_none();
     let mut all = Delays::default();
     for session in sessions {
-        let delays = measure(Path::new(session), rate.parse()?, factor.parse()?, bound)?;
+        let rates: Result<Vec<f64>, _> = rates.split(',').map(str::parse).collect();
+        let delays = measure(Path::new(session), &rates?, factor.parse()?, bound)?;
         all.online.extend(delays.online);
         all.clairvoyant.extend(delays.clairvoyant);
         all.excess.extend(delays.excess);
