@@ -173,7 +173,7 @@ pub(crate) fn mean(values: &mut [f64]) -> Option<f64> {
     sums::mean(values.iter().copied())
 }
 
-/// [`sorted_quantile`] of values in any order, in linear time; `None` without values. Reorders `values`.
+/// [`skinrig_model::quantile()`] of values in any order, in linear time; `None` without values. Reorders `values`.
 pub fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
     if values.is_empty() {
         return None;
