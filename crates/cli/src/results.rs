@@ -260,7 +260,12 @@ pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
     let paths = write_shown(&results, args.out.as_deref(), html.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
     crate::catalogue::automatic::register(&args.session);
-    let digits = args.digits.map(|n| true_digits(&args.session, choices, n));
+    let valid = results.analysis.is_valid();
+    if args.digits.is_some() && !valid {
+        errln!("note: the session is INVALID: its numbers have no true digits to show");
+    }
+    let repetitions = args.digits.filter(|_| valid);
+    let digits = repetitions.map(|n| true_digits(&args.session, choices, n));
     print_results(&results, digits.transpose()?.as_ref(), output, &paths);
     check_limit(&results, args.max_rmse)
 }

@@ -21,7 +21,7 @@ const URL: &str = "SKINRIG_TEST_URL";
 
 /// Registers sessions in a random order until it is killed; prints each one that is registered.
 #[test]
-#[ignore = "a program of the other tests"]
+#[ignore = "run as a process by the tests below, by name"]
 fn a_program() {
     let Ok(folder) = std::env::var(FOLDER) else {
         return;
@@ -184,7 +184,7 @@ fn a_killed_server_loses_and_doubles_nothing() {
 }
 
 #[test]
-#[ignore = "ten seconds"]
+#[ignore = "ten seconds: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-catalogue -- --ignored --nocapture"]
 fn two_hundred_kills() {
     kills(200, 2);
     println!("200 kills of {PROGRAMS} programs: {SESSIONS} sessions, 0 lost, 0 doubled");
@@ -192,7 +192,7 @@ fn two_hundred_kills() {
 
 #[cfg(unix)]
 #[test]
-#[ignore = "a minute"]
+#[ignore = "a minute: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-catalogue -- --ignored --nocapture"]
 fn two_hundred_kills_with_a_server() {
     if kills_with_a_server(200, 2) {
         println!(

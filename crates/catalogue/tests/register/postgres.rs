@@ -122,7 +122,7 @@ fn a_reader_asks_and_does_not_register() {
 }
 
 #[test]
-#[ignore = "measures; a minute"]
+#[ignore = "measures, a minute: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-catalogue -- --ignored --nocapture"]
 fn ten_thousand_sessions_in_postgresql() {
     let Some(server) = Server::start() else {
         return;

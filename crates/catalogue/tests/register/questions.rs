@@ -305,7 +305,7 @@ pub(crate) fn measure(catalogue: &mut Catalogue, lab: &Lab, database: &str) -> S
 }
 
 #[test]
-#[ignore = "measures; 15 s"]
+#[ignore = "measures, 15 s: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-catalogue -- --ignored --nocapture"]
 fn ten_thousand_sessions_in_sqlite() {
     let lab = Lab::with_sessions(0);
     println!("{}", measure(&mut lab.open(), &lab, "SQLite"));

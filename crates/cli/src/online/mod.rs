@@ -284,6 +284,13 @@ pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
             legs.len() + 1
         )));
     }
+    if !analysis.is_valid() {
+        return Err(Failure::limit(format!(
+            "{0}: expected a valid session, found an INVALID one: {1}\n  next: `skinrig analyze {0}` says what to mend",
+            args.session.display(),
+            analysis.invalid_because().join("; ")
+        )));
+    }
     let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
     let learnt = learnt(args, &analysis)?;
     let both = (&analysis, &aligned.input);
@@ -304,6 +311,14 @@ pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
         outln!("{summary}");
     } else {
         print(&learnt, args.stop_at, &felts, &replay, &header.rig_name);
+    }
+    if replay.equal < replay.compared {
+        return Err(Failure::internal(format!(
+            "{}: expected the bits of the analysis in all {} press windows, found them in {}\n  next: analyse the session again, and report this if it stays",
+            args.session.display(),
+            replay.compared,
+            replay.equal
+        )));
     }
     Ok(if replay.stopped {
         Exit::Stopped

@@ -193,6 +193,15 @@ fn a_session_whose_clocks_are_beyond_a_limit_is_invalid_everywhere() {
     skinrig(&["tradeoff", &session, "--set", strict])
         .code(4)
         .expect_stderr(&["INVALID"]);
+    let digits = skinrig(&["analyze", &session, "--set", strict, "--digits=2"])
+        .code(4)
+        .expect_stderr(&["INVALID: its numbers have no true digits"]);
+    assert!(!digits.out.contains("true digits"), "{digits:?}");
+
+    let invalid = text(&lab.record("t", &["--set", strict]));
+    skinrig(&["online", &invalid])
+        .code(4)
+        .expect_stderr(&["expected a valid session, found an INVALID one", "next:"]);
 }
 
 #[test]
