@@ -187,6 +187,12 @@ mod tests {
         names.sort();
         assert_eq!(files, names);
         for question in QUESTIONS {
+            let is_valid = question.sql.contains("is_valid = 1");
+            assert!(
+                is_valid || !question.sql.contains("rmse_mm"),
+                "{}: numbers of an INVALID analysis are not to be read",
+                question.name
+            );
             let count = question.parameters.len();
             for n in 1..=9 {
                 let used = question.sql.contains(&format!("${n}"));
