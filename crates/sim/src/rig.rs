@@ -78,7 +78,7 @@ fn pixel_factory(config: &SimConfig, id: CameraId) -> PixelFactory {
         match level {
             SimLevel::Kinematic => None,
             SimLevel::Geometric => Some(Box::new(GeometricModel::new(&scene, &geometric))),
-            SimLevel::Optical => Some(Box::new(OpticalModel::build(&scene, optical))),
+            SimLevel::Optical => Some(Box::new(OpticalModel::build(&scene, optical, 1))),
         }
     })
 }

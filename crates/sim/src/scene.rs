@@ -17,28 +17,6 @@ pub struct TipSample {
     pub position: Point3<Skin>,
 }
 
-/// A tip beside the first one, on the same holder.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FurtherTip {
-    /// Offset from the first tip, skin frame, mm.
-    pub offset_mm: [f64; 2],
-    /// Height of its end above that of the first one, mm: it touches later and less deep.
-    pub shorter_mm: f64,
-}
-
-impl FurtherTip {
-    /// Its position when the first tip is at `first`.
-    #[must_use]
-    pub fn position(&self, first: Point3<Skin>) -> Point3<Skin> {
-        let [dx, dy] = self.offset_mm;
-        Point3::new(
-            first.x_mm + dx,
-            first.y_mm + dy,
-            first.z_mm + self.shorter_mm,
-        )
-    }
-}
-
 /// Interval of tip samples, ns: the robot's 1 kHz.
 pub const GRID_NS: i64 = 1_000_000;
 

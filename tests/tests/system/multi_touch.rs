@@ -14,8 +14,8 @@ use skinrig_model::{
 };
 use skinrig_planted::{Memory, PlantedPress, mark, press, timing};
 use skinrig_sim::SimConfig;
-use skinrig_sim::optical::SeveralTips;
-use skinrig_sim::scene::{FurtherTip, GRID_NS};
+use skinrig_sim::optical::OpticalModel;
+use skinrig_sim::scene::GRID_NS;
 use skinrig_statistics::seeded;
 
 const PERIOD_S: f64 = 2.5;
@@ -30,6 +30,8 @@ const APART_MM: f64 = 15.0;
 const ONSETS_MS: [f64; 2] = [2.0, 25.0];
 /// Touches farther than this from both true ones are ghosts, mm.
 const GHOST_MM: f64 = 7.5;
+/// Height of a tip that does not touch above the one that does, mm.
+const OFF_MM: f64 = 5.0;
 /// Permitted error in units of the single-touch RMSE.
 const WITHIN: f64 = 1.5;
 
@@ -123,11 +125,8 @@ fn height_mm(press: &Press, t: f64) -> f64 {
 /// Events of one camera in the rows of its crop.
 fn events(config: &SimConfig, id: CameraId, presses: &[Press]) -> Vec<CdEvent> {
     let rows = AnalysisSettings::default().crop_v[id.index()];
-    let away = FurtherTip {
-        offset_mm: [0.0; 2],
-        shorter_mm: 5.0,
-    };
-    let mut model = SeveralTips::new(&config.scene(id), config.optical, &[away]);
+    let mut model = OpticalModel::with_config(&config.scene(id), config.optical, 2)
+        .expect("the default constants");
     let (mut all, mut some) = (Vec::new(), Vec::new());
     let end_s = presses.last().map_or(0.0, |p| p.contact_s + PERIOD_S - 1.0);
     let mut k = 0;
@@ -143,7 +142,7 @@ fn events(config: &SimConfig, id: CameraId, presses: &[Press]) -> Vec<CdEvent> {
             Kind::Pair { at, after_ms } => {
                 Point3::new(at[0], at[1], z + after_ms * 1e-3 * SPEED_MM_S)
             }
-            _ => away.position(one),
+            _ => Point3::new(press.at[0], press.at[1], z + OFF_MM),
         };
         some.clear();
         model.advance_to(ms * GRID_NS, &[one, two], &mut some);

@@ -2,17 +2,18 @@
 //! flanks return.
 //!
 //! For a dent that is `a` mm deep, column `u` loses the part `x = 1 - exp(-a loss(u))` of the light that
-//! arrives from behind it, and a pixel in row `v` of that column sees `I / I0 = 1 + x c(u, v)`. Everything but
-//! `x` is computed once per dent.
+//! arrives from behind it. Everything else is computed once per dent.
 
 use std::ops::Range;
 
-use skinrig_model::{CameraModel, SENSOR_HEIGHT, SENSOR_WIDTH};
+use skinrig_model::{CameraModel, SENSOR_WIDTH};
 
 use crate::scene::SceneConfig;
 
+use super::Optics;
 use super::config::OpticalConfig;
 use super::light::{Column, Illumination, Vec2, dot};
+use super::pixels::skin_rows;
 
 /// Step of the integrals across the dent, mm.
 const STEP_MM: f64 = 0.5;
@@ -68,33 +69,29 @@ impl DentShape {
 /// Effect of one dent on the image of one camera.
 #[derive(Debug, Clone)]
 pub(super) struct Dent {
-    /// Columns and rows whose pixels must be evaluated.
+    /// Columns that it changes.
     pub(super) columns: Range<usize>,
-    pub(super) rows: Range<usize>,
-    /// Columns and rows that this dent itself changes.
-    pub(super) own_columns: Range<usize>,
-    pub(super) own_rows: Range<usize>,
     /// Loss per mm of indentation, for each column of the sensor.
     pub(super) loss_per_mm: Vec<f64>,
+    pub(super) largest_loss_per_mm: f64,
     /// Part of the light that comes from behind the dent, for each column; 0 where it blocks nothing.
     pub(super) shadow: Vec<f64>,
     /// Light returned by the flanks in units of the column's undisturbed light and of `x`, for each column.
     pub(super) shine: Vec<f64>,
-    /// Weights of shadow and shine, for each row of the sensor.
-    pub(super) shadow_rows: Vec<f64>,
-    pub(super) shine_rows: Vec<f64>,
+    /// Weights of shadow and shine, for each row of the skin.
+    pub(super) shadow_rows: Vec<f32>,
+    pub(super) shine_rows: Vec<f32>,
 }
 
 impl Dent {
-    /// The dent at `place`. Pixels that `replaced` changed are also evaluated.
-    pub(super) fn new(
-        scene: &SceneConfig,
-        config: &OpticalConfig,
-        light: &Illumination,
-        columns: &[Column],
-        place: Vec2,
-        replaced: Option<&Self>,
-    ) -> Self {
+    /// The dent at `place`.
+    pub(super) fn new(optics: &Optics, place: Vec2) -> Self {
+        let Optics {
+            scene,
+            config,
+            light,
+            columns,
+        } = optics;
         let shape = DentShape::new(scene, config);
         let camera = &scene.camera;
         let lit = flank_light(light, place);
@@ -113,30 +110,12 @@ impl Dent {
             shine[u] = config.flank_gain * crossing.shine_per_mm * fade
                 / (crossing.loss_per_mm * column.total);
         }
-        let own_columns = extent(&loss_per_mm);
         let image = Image::new(scene, config, place);
-        let own_rows = image.rows();
-        let union = |a: &Range<usize>, b: Option<&Range<usize>>| match b {
-            Some(b) if a.is_empty() => b.clone(),
-            Some(b) if !b.is_empty() => a.start.min(b.start)..a.end.max(b.end),
-            _ => a.clone(),
-        };
-        let rows = union(&own_rows, replaced.map(|d| &d.own_rows));
-        let row_weights = |centre: f64, sigma: f64| {
-            let mut weights = vec![0.0; usize::from(SENSOR_HEIGHT)];
-            for v in own_rows.clone() {
-                let z = (v as f64 - centre) / sigma;
-                weights[v] = libm::exp(-0.5 * z * z);
-            }
-            weights
-        };
         Self {
-            columns: union(&own_columns, replaced.map(|d| &d.own_columns)),
-            rows,
-            shadow_rows: row_weights(image.centre, image.sigma),
-            shine_rows: row_weights(image.shine_centre, image.shine_sigma),
-            own_columns,
-            own_rows,
+            columns: extent(&loss_per_mm),
+            shadow_rows: image.weights(scene, image.centre, image.sigma),
+            shine_rows: image.weights(scene, image.shine_centre, image.shine_sigma),
+            largest_loss_per_mm: loss_per_mm.iter().copied().fold(0.0, f64::max),
             loss_per_mm,
             shadow,
             shine,
@@ -146,29 +125,6 @@ impl Dent {
     /// The part of the far light that column `u` loses at a depth of `amplitude_mm`: 0..1.
     pub(super) fn lost(&self, u: usize, amplitude_mm: f64) -> f64 {
         -libm::expm1(-amplitude_mm * self.loss_per_mm[u])
-    }
-
-    /// The depth at which column `u` has lost the part `x`; infinite where that never happens.
-    pub(super) fn depth_of_loss(&self, u: usize, x: f64) -> f64 {
-        let k = self.loss_per_mm[u];
-        if k == 0.0 {
-            // The dent does not affect this column: x stays 0.
-            return if x < 0.0 {
-                f64::NEG_INFINITY
-            } else {
-                f64::INFINITY
-            };
-        }
-        if x >= 1.0 {
-            f64::INFINITY
-        } else {
-            -libm::log1p(-x) / k
-        }
-    }
-
-    /// `c` in `I / I0 = 1 + x c`; above -1.
-    pub(super) fn contrast(&self, u: usize, v: usize) -> f64 {
-        self.shine[u] * self.shine_rows[v] - self.shadow[u] * self.shadow_rows[v]
     }
 }
 
@@ -285,7 +241,6 @@ struct Image {
     sigma: f64,
     shine_centre: f64,
     shine_sigma: f64,
-    limits: (usize, usize),
 }
 
 impl Image {
@@ -312,14 +267,22 @@ impl Image {
             sigma,
             shine_centre: centre - half_height - 0.5 * config.dent_sigma_px,
             shine_sigma: 0.7 * sigma,
-            limits: (first, last.min(usize::from(SENSOR_HEIGHT) - 1)),
         }
     }
 
-    fn rows(&self) -> Range<usize> {
-        let top = (self.centre - ROW_SIGMAS * self.sigma).max(self.limits.0 as f64) as usize;
-        let bottom = (self.centre + ROW_SIGMAS * self.sigma).min(self.limits.1 as f64) as usize;
-        top..bottom + 1
+    /// Gaussian weights of the skin's rows, within the image's extent.
+    fn weights(&self, scene: &SceneConfig, centre: f64, sigma: f64) -> Vec<f32> {
+        let reach = ROW_SIGMAS * self.sigma;
+        skin_rows(scene)
+            .map(|v| v as f64)
+            .map(|v| {
+                if (v - self.centre).abs() > reach {
+                    return 0.0;
+                }
+                let z = (v - centre) / sigma;
+                libm::exp(-0.5 * z * z) as f32
+            })
+            .collect()
     }
 }
 

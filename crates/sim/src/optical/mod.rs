@@ -1,60 +1,64 @@
 //! The optical level: events that follow from a light-path model of the skin.
 //!
-//! Light of emitters travels in the plane of the skin to the camera; the dent of the tip blocks light of the
+//! Light of emitters travels in the plane of the skin to the camera; the dent of a tip blocks light of the
 //! rays that cross it and returns some from its flanks; each pixel turns changes of its log intensity into
 //! events. The events do not depend on the touched position directly: localisation errors result from the
 //! optics. Formulas, constants and limits: `docs/explanation/optical-model.md`.
 //!
-//! Data flow: `light` (once) -> `dent` (once per touched place) -> `pixels` (every millisecond with a change).
-//! `noise` is added independently. `several` does the same for tips whose dents overlap.
+//! Data flow: `light` (once) -> `dent` (once per touched place) -> `touches` (the dents of this millisecond, those
+//! that a tip has left among them) -> `column` (their light, row by row) -> `pixels`. `noise` is added independently.
 
+mod column;
 mod config;
 mod contact;
 mod dent;
 mod light;
 mod noise;
 mod pixels;
-mod several;
+mod refractory;
 #[cfg(test)]
 mod several_tests;
 #[cfg(test)]
 mod tests;
-mod untouched;
+mod touches;
 
 pub use config::{InvalidOpticalSetting, OpticalConfig};
-pub use several::SeveralTips;
 
+use skinrig_model::{Point3, Skin};
+
+use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
-use contact::Contact;
-use dent::Dent;
 use light::{Column, Illumination};
 use noise::Noise;
-use pixels::{Pixels, Ramp};
-use untouched::Untouched;
+use pixels::Pixels;
+use touches::Touches;
 
-/// Pixels of one camera over the optically modelled skin.
+/// What a dent is made from: the skin, its light, and the camera's columns.
 #[derive(Debug, Clone)]
-pub struct OpticalModel {
+struct Optics {
     scene: SceneConfig,
     config: OpticalConfig,
     light: Illumination,
     columns: Vec<Column>,
+}
+
+/// Pixels of one camera over the optically modelled skin.
+#[derive(Debug, Clone)]
+pub struct OpticalModel {
+    optics: Optics,
+    touches: Touches,
     pixels: Pixels,
     noise: Noise,
-    contact: Contact,
-    dent: Dent,
-    /// Part of the creep that happens in one grid step.
-    creep_step: f64,
     first_ns: i64,
-    last: Option<TipSample>,
+    last: Option<(i64, Vec<Point3<Skin>>)>,
 }
 
 impl OpticalModel {
     /// The model with the default constants.
     #[must_use]
     pub fn new(scene: &SceneConfig) -> Self {
-        Self::build(scene, OpticalConfig::default())
+        Self::build(scene, OpticalConfig::default(), 1)
     }
 
     /// The model with the lamps off: no emitter is lit and dark pixels show no shot noise. Leakage and hot pixels remain.
@@ -65,42 +69,42 @@ impl OpticalModel {
             shot_hz: 0.0,
             ..OpticalConfig::default()
         };
-        Self::build(scene, config)
+        Self::build(scene, config, 1)
     }
 
-    /// The model with other constants.
+    /// The model with other constants, touched by `tips` tips that move independently.
     ///
     /// # Errors
     /// If a constant is outside its range.
     pub fn with_config(
         scene: &SceneConfig,
         config: OpticalConfig,
+        tips: usize,
     ) -> Result<Self, InvalidOpticalSetting> {
         config.check()?;
-        Ok(Self::build(scene, config))
+        Ok(Self::build(scene, config, tips))
     }
 
     /// The model with constants already checked.
-    pub(crate) fn build(scene: &SceneConfig, config: OpticalConfig) -> Self {
-        let Untouched {
-            light,
-            columns,
-            noise,
-            mut pixels,
-            contact,
-            dent,
-        } = Untouched::new(scene, &config);
-        pixels.start_dent(&dent);
-        Self {
+    pub(crate) fn build(scene: &SceneConfig, config: OpticalConfig, tips: usize) -> Self {
+        let light = Illumination::new(&scene.outline, &config);
+        let columns = light::columns(&scene.camera, &scene.outline, &light, &config);
+        let mut thresholds = Stream::new(scene.seed, Purpose::Pixels, 1);
+        let (noise, pixels) = (
+            Noise::new(scene, &config, &columns),
+            Pixels::new(scene, &config, &mut thresholds),
+        );
+        let optics = Optics {
             scene: scene.clone(),
             config,
             light,
             columns,
+        };
+        Self {
+            touches: Touches::new(&optics, tips),
+            optics,
             pixels,
             noise,
-            contact,
-            dent,
-            creep_step: Contact::creep_step(&config),
             first_ns: 0,
             last: None,
         }
@@ -112,52 +116,44 @@ impl OpticalModel {
         self.noise.total_hz()
     }
 
-    /// One grid step from `t_ns`, at whose end the tip is at `[x, y, z]` mm.
-    fn step(&mut self, t_ns: i64, tip: [f64; 3], out: &mut Vec<PixelEvent>) {
+    /// Moves each tip on a straight line to its position at `t_ns`, on the grid, and appends the events until then, sorted by
+    /// time. The first call only places the tips; tips without a position stay off the skin.
+    pub fn advance_to(&mut self, t_ns: i64, tips: &[Point3<Skin>], out: &mut Vec<PixelEvent>) {
+        let Some((last_ns, mut from)) = self.last.take() else {
+            self.first_ns = t_ns;
+            self.last = Some((t_ns, tips.to_vec()));
+            return;
+        };
+        let steps = (t_ns - last_ns) / GRID_NS;
+        for k in 0..steps {
+            let part = (k + 1) as f64 / steps as f64;
+            let t_ns = last_ns + k * GRID_NS;
+            let at = from.iter().zip(tips).map(|(a, b)| {
+                let (a, b) = (a.to_array(), b.to_array());
+                [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * part)
+            });
+            self.touches.follow(&self.optics, at);
+            self.step(t_ns, out);
+        }
+        from.clear();
+        from.extend_from_slice(tips);
+        self.last = Some((t_ns, from));
+    }
+
+    /// The events of the grid step from `t_ns`, through which the touches have already moved.
+    fn step(&mut self, t_ns: i64, out: &mut Vec<PixelEvent>) {
         let begin = out.len();
-        let ramp = self.indent(t_ns, tip);
-        self.pixels.step(&self.dent, ramp, out);
+        self.pixels.step(&mut self.touches, t_ns, out);
         self.noise
             .step(t_ns, t_ns - self.first_ns, &mut self.pixels, out);
         out[begin..].sort_unstable_by_key(|e| (e.t_ns, e.y, e.x, e.polarity.bit()));
-    }
-
-    fn indent(&mut self, t_ns: i64, tip: [f64; 3]) -> Ramp {
-        let step = self.creep_step;
-        let (ramp, moved) = self
-            .contact
-            .indent(&self.scene, &self.config, step, t_ns, tip);
-        if moved {
-            self.dent = Dent::new(
-                &self.scene,
-                &self.config,
-                &self.light,
-                &self.columns,
-                self.contact.place,
-                Some(&self.dent),
-            );
-            self.pixels.start_dent(&self.dent);
-        }
-        ramp
     }
 }
 
 impl PixelModel for OpticalModel {
     fn advance(&mut self, tips: &[TipSample], out: &mut Vec<PixelEvent>) {
-        for &tip in tips {
-            let Some(last) = self.last else {
-                self.first_ns = tip.t_ns;
-                self.last = Some(tip);
-                continue;
-            };
-            let steps = (tip.t_ns - last.t_ns) / GRID_NS;
-            let (a, b) = (last.position.to_array(), tip.position.to_array());
-            for k in 0..steps {
-                let part = (k + 1) as f64 / steps as f64;
-                let at = [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * part);
-                self.step(last.t_ns + k * GRID_NS, at, out);
-            }
-            self.last = Some(tip);
+        for tip in tips {
+            self.advance_to(tip.t_ns, &[tip.position], out);
         }
     }
 }

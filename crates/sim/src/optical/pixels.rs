@@ -1,328 +1,323 @@
-//! The pixels of one camera: references, thresholds, refractory time.
+//! The pixels of one camera: thresholds and refractory time.
 //!
-//! A pixel stores the light at its last event and emits the next one when the light has changed by its threshold (in
-//! log intensity). Light is `1 + x c` (see the `dent` module), monotone in the dent's depth: therefore each
-//! pixel stores the two values of `x` at which it emits next, each column the two depths, and no other pixel
-//! is evaluated while the dent moves.
+//! A pixel stores the light at its last event and emits the next one when the light has changed by its threshold (in log
+//! intensity). Each pixel stores the two lights at which it emits next, and each column the least change of light that reaches
+//! one of them: no other column is evaluated while dents move.
 
 use std::ops::Range;
 
 use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
+use skinrig_simd::InstructionSet;
 
 use crate::random::Stream;
 use crate::scene::{GRID_NS, PixelEvent, SceneConfig};
 
+use super::column::{Block, ColumnLight, LANES, Rows, crossed_blocks, least_slack, lesser};
 use super::config::OpticalConfig;
-use super::dent::Dent;
+use super::refractory::Refractory;
+use super::touches::Touches;
 
 const NS_PER_US: i64 = 1_000;
 const STEP_US: i64 = GRID_NS / NS_PER_US;
 /// Lower limit on a pixel's threshold after mismatch, log intensity.
 const LEAST_THRESHOLD: f64 = 0.01;
-/// Contrasts below this are treated as zero.
-const NO_CONTRAST: f64 = 1e-9;
+const WIDTH: usize = SENSOR_WIDTH as usize;
 
-/// Light during one grid step: the depth changes linearly from `from_mm` to `to_mm`.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Ramp {
-    pub(super) t_ns: i64,
-    pub(super) from_mm: f64,
-    pub(super) to_mm: f64,
+/// Rows of the sensor that see the skin.
+pub(super) fn skin_rows(scene: &SceneConfig) -> Range<usize> {
+    let first = usize::from(scene.skin_rows.0);
+    let end = (usize::from(scene.skin_rows.1) + 1).min(usize::from(SENSOR_HEIGHT));
+    first..end.max(first)
 }
 
-/// The light of a pixel during a step: `x` changes linearly from `from` to `to`.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Change {
-    pub(super) t_ns: i64,
-    pub(super) from: f64,
-    pub(super) to: f64,
-}
-
-impl Change {
-    fn at_us(&self, us: i64) -> f64 {
-        self.from + (self.to - self.from) * (us as f64 / STEP_US as f64)
-    }
-}
-
-/// One pixel with the skin in its view.
-#[derive(Debug, Clone, Copy)]
-struct Pixel {
-    /// Light at the last event, undisturbed = 1.
-    reference: f64,
-    /// Factors on the reference for an ON event, above 1, and an OFF event, below 1.
-    on: f64,
-    off: f64,
-    /// It emits if `x` falls below `low` or rises above `high`. Infinite while it is held.
-    low: f64,
-    high: f64,
-    /// In its refractory time; the reference is set when that ends.
-    held: bool,
-}
-
-impl Pixel {
-    fn hold(&mut self) {
-        self.held = true;
-        (self.low, self.high) = (f64::NEG_INFINITY, f64::INFINITY);
-    }
-
-    /// Computes the next `x` at which the pixel emits, for contrast `c`.
-    fn set_next(&mut self, c: f64) {
-        let (up, down) = (self.reference * self.on, self.reference * self.off);
-        if c.abs() < NO_CONTRAST {
-            // The light is 1 for every x: emit immediately or never.
-            self.high = if up < 1.0 { -1.0 } else { f64::INFINITY };
-            self.low = if down > 1.0 { 2.0 } else { f64::NEG_INFINITY };
-        } else if c > 0.0 {
-            (self.low, self.high) = ((down - 1.0) / c, (up - 1.0) / c);
-        } else {
-            (self.low, self.high) = ((up - 1.0) / c, (down - 1.0) / c);
-        }
-    }
-}
-
-/// All pixels of a camera.
+/// All pixels of a camera. Pixels that see the skin are stored column by column, in blocks of rows.
 #[derive(Debug, Clone)]
 pub(super) struct Pixels {
-    first_row: usize,
-    rows: usize,
-    /// Pixels with the skin in their view, column by column.
-    skin: Vec<Pixel>,
-    /// Time of the last event of every pixel of the sensor, row by row.
-    last_ns: Vec<i64>,
-    /// (column, row) of the held pixels.
-    held: Vec<(u16, u16)>,
-    /// Depths beyond which some pixel of the column emits.
-    low_mm: Vec<f64>,
-    high_mm: Vec<f64>,
+    rows: Range<usize>,
+    /// Blocks of rows in a column.
+    blocks: usize,
+    pixels: Vec<Block>,
+    refractory: Refractory,
     refractory_ns: i64,
-    /// The dent is new: its pixels must be evaluated even if it does not move.
-    fresh: bool,
+    /// Per column: least change of its lost light since the last evaluation that can cause an event.
+    slack: Vec<f32>,
+    /// No column has an event before one has lost or regained so much light.
+    margin: f32,
+    /// The column that was evaluated last.
+    column: ColumnLight,
+    instructions: InstructionSet,
 }
 
 impl Pixels {
     pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig, random: &mut Stream) -> Self {
-        let first_row = usize::from(scene.skin_rows.0);
-        let end_row = (usize::from(scene.skin_rows.1) + 1).min(usize::from(SENSOR_HEIGHT));
-        let rows = end_row.saturating_sub(first_row);
-        let width = usize::from(SENSOR_WIDTH);
-        let skin = (0..width * rows)
-            .map(|_| {
-                let mut threshold = |mean: f64| {
-                    (mean + config.threshold_sigma * random.gauss()).max(LEAST_THRESHOLD)
-                };
-                let (on, off) = (
-                    threshold(config.threshold_on),
-                    threshold(config.threshold_off),
-                );
-                // The last event before the session left each pixel's reference anywhere between its
-                // thresholds.
-                let reference = libm::exp(0.5 * (random.unit() * (on + off) - on));
-                Pixel {
-                    reference,
-                    on: libm::exp(on),
-                    off: libm::exp(-off),
-                    low: f64::NEG_INFINITY,
-                    high: f64::INFINITY,
-                    held: false,
-                }
-            })
-            .collect();
+        let rows = skin_rows(scene);
+        let blocks = rows.len().div_ceil(LANES);
+        let silent = Block {
+            bounds: Rows::SILENT,
+            factors: Rows::SILENT,
+        };
+        let mut all = vec![silent; WIDTH * blocks];
+        for i in 0..WIDTH * rows.len() {
+            let mut threshold =
+                |mean: f64| (mean + config.threshold_sigma * random.gauss()).max(LEAST_THRESHOLD);
+            let (rise, fall) = (
+                threshold(config.threshold_on),
+                threshold(config.threshold_off),
+            );
+            // The last event before the session left each pixel's reference anywhere between its
+            // thresholds.
+            let reference = libm::exp(0.5 * (random.unit() * (rise + fall) - rise));
+            let (up, down) = (libm::exp(rise), libm::exp(-fall));
+            let (u, v) = (i / rows.len(), i % rows.len());
+            let (block, lane) = (&mut all[u * blocks + v / LANES], v % LANES);
+            block.factors.up[lane] = up as f32;
+            block.factors.down[lane] = down as f32;
+            block.bounds.up[lane] = (reference * up) as f32;
+            block.bounds.down[lane] = (reference * down) as f32;
+        }
         Self {
-            first_row,
+            column: ColumnLight::new(blocks * LANES),
+            instructions: InstructionSet::best(),
             rows,
-            skin,
-            last_ns: vec![i64::MIN; width * usize::from(SENSOR_HEIGHT)],
-            held: Vec::new(),
-            low_mm: vec![f64::NEG_INFINITY; width],
-            high_mm: vec![f64::INFINITY; width],
+            blocks,
+            pixels: all,
+            refractory: Refractory::new(),
             refractory_ns: i64::from(config.refractory_us) * NS_PER_US,
-            fresh: false,
+            slack: vec![f32::NEG_INFINITY; WIDTH],
+            margin: f32::NEG_INFINITY,
         }
     }
 
-    /// A new dent: every pixel in its reach gets its next thresholds.
-    pub(super) fn start_dent(&mut self, dent: &Dent) {
-        self.fresh = true;
-        for u in dent.columns.clone() {
-            for v in dent.rows.clone() {
-                let i = self.index(u, v);
-                if !self.skin[i].held {
-                    self.skin[i].set_next(dent.contrast(u, v));
-                }
-            }
-            self.set_next_in_column(dent, u);
-        }
-    }
-
-    /// Simulates one grid step with the given dent.
-    pub(super) fn step(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
-        self.release_in_dent(dent, ramp, out);
-        if ramp.from_mm == ramp.to_mm && !self.fresh {
+    /// Simulates the grid step from `t_ns`, through which the touches have moved.
+    pub(super) fn step(&mut self, touches: &mut Touches, t_ns: i64, out: &mut Vec<PixelEvent>) {
+        self.release(touches, t_ns, out);
+        if touches.rest() {
             return;
         }
-        self.fresh = false;
-        for u in dent.columns.clone() {
-            if ramp.to_mm > self.high_mm[u] || ramp.to_mm < self.low_mm[u] {
-                let loss = loss_of(dent, ramp, u);
-                for v in dent.rows.clone() {
-                    let pixel = &self.skin[self.index(u, v)];
-                    if loss.to > pixel.high || loss.to < pixel.low {
-                        self.emit((u, v), dent.contrast(u, v), loss, 0, out);
+        for columns in &touches.disturbed {
+            self.slack[columns.clone()].fill(f32::NEG_INFINITY);
+            self.margin = f32::NEG_INFINITY;
+        }
+        self.margin -= touches.largest_change();
+        if self.margin > 0.0 {
+            return;
+        }
+        let mut changes = [0.0; WIDTH];
+        touches.changes(&mut changes);
+        let mut margin = [f32::INFINITY; LANES];
+        for (block, changes) in changes.as_chunks::<LANES>().0.iter().enumerate() {
+            let first = block * LANES;
+            let mut left = *changes;
+            for (left, slack) in left.iter_mut().zip(&self.slack[first..first + LANES]) {
+                *left = slack - *left;
+            }
+            if left.iter().any(|x| *x < 0.0) {
+                for (left, u) in left.iter_mut().zip(first..) {
+                    if *left < 0.0 {
+                        self.evaluate(touches, u, t_ns, out);
+                        *left = self.slack[u];
                     }
                 }
-                self.set_next_in_column(dent, u);
+            }
+            for (margin, left) in margin.iter_mut().zip(left) {
+                *margin = lesser(*margin, left);
             }
         }
+        self.margin = margin.into_iter().fold(f32::INFINITY, lesser);
+    }
+
+    #[cfg(test)]
+    pub(super) fn use_instructions(&mut self, set: InstructionSet) {
+        self.instructions = set;
+    }
+
+    /// Every column is evaluated in the next step.
+    #[cfg(test)]
+    pub(super) fn forget_slack(&mut self) {
+        self.slack.fill(f32::NEG_INFINITY);
+        self.margin = f32::NEG_INFINITY;
     }
 
     /// Adds an event not caused by light. Returns false when the pixel is in its refractory time.
     pub(super) fn inject(&mut self, event: PixelEvent, out: &mut Vec<PixelEvent>) -> bool {
-        let (u, v) = (usize::from(event.x), usize::from(event.y));
-        let last = &mut self.last_ns[v * usize::from(SENSOR_WIDTH) + u];
-        if event.t_ns < last.saturating_add(self.refractory_ns) {
+        let (x, y) = (event.x, event.y);
+        if let Some(k) = self.refractory.position(x, y)
+            && event.t_ns < self.refractory.pixels[k].2
+        {
             return false;
         }
-        *last = event.t_ns;
         out.push(event);
-        if (self.first_row..self.first_row + self.rows).contains(&v) {
-            let i = self.index(u, v);
-            if !self.skin[i].held {
-                self.skin[i].hold();
-                self.held.push((event.x, event.y));
-            }
+        self.refractory.set(x, y, event.t_ns + self.refractory_ns);
+        let v = usize::from(y);
+        if self.rows.contains(&v) {
+            self.hold(self.block(usize::from(x), v - self.rows.start));
         }
         true
     }
 
-    fn index(&self, u: usize, v: usize) -> usize {
-        u * self.rows + v - self.first_row
+    /// Block and lane of the pixel in column `u` and the skin's row `v`.
+    const fn block(&self, u: usize, v: usize) -> (usize, usize) {
+        (u * self.blocks + v / LANES, v % LANES)
     }
 
-    /// Every pixel gets its next thresholds on the light itself: `x` is its change, the contrast 1.
-    pub(super) fn start_by_light(&mut self) {
-        for pixel in &mut self.skin {
-            pixel.set_next(1.0);
-        }
+    /// Lights at which a pixel emits.
+    fn bounds(&self, (block, lane): (usize, usize)) -> (f64, f64) {
+        let rows = &self.pixels[block].bounds;
+        (f64::from(rows.up[lane]), f64::from(rows.down[lane]))
     }
 
-    /// Rows with pixels of the skin.
-    pub(super) const fn skin_rows(&self) -> Range<usize> {
-        self.first_row..self.first_row + self.rows
+    fn hold(&mut self, (block, lane): (usize, usize)) {
+        let rows = &mut self.pixels[block].bounds;
+        (rows.up[lane], rows.down[lane]) = (f32::INFINITY, f32::NEG_INFINITY);
     }
 
-    /// Columns of the pixels in their refractory times.
-    pub(super) fn held_columns(&self) -> impl Iterator<Item = usize> {
-        self.held.iter().map(|(x, _)| usize::from(*x))
+    fn set_reference(&mut self, (block, lane): (usize, usize), light: f64) {
+        let (light, block) = (light as f32, &mut self.pixels[block]);
+        block.bounds.up[lane] = light * block.factors.up[lane];
+        block.bounds.down[lane] = light * block.factors.down[lane];
     }
 
-    /// How far `x` of a pixel is from the next event; negative beyond it.
-    pub(super) fn slack(&self, u: usize, v: usize, x: f64) -> f64 {
-        let pixel = &self.skin[self.index(u, v)];
-        (pixel.high - x).min(x - pixel.low)
-    }
-
-    fn release_in_dent(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
-        let see = |u, v| (loss_of(dent, ramp, u), dent.contrast(u, v));
-        self.release(ramp.t_ns, see, |u, x| dent.depth_of_loss(u, x), out);
-    }
-
-    /// Pixels whose refractory time ends in the step from `t_ns` take the light at that time as their reference. `see` returns the
-    /// change and contrast of a pixel, `bound` the bound of a column for an `x`.
-    pub(super) fn release(
-        &mut self,
-        t_ns: i64,
-        see: impl Fn(usize, usize) -> (Change, f64),
-        bound: impl Fn(usize, f64) -> f64,
-        out: &mut Vec<PixelEvent>,
-    ) {
+    /// Pixels whose refractory time ends in the step take the light at that time as their reference.
+    fn release(&mut self, touches: &mut Touches, t_ns: i64, out: &mut Vec<PixelEvent>) {
         let mut k = 0;
-        while k < self.held.len() {
-            let (x, y) = self.held[k];
-            let (u, v) = (usize::from(x), usize::from(y));
-            let end_ns =
-                self.last_ns[v * usize::from(SENSOR_WIDTH) + u].saturating_add(self.refractory_ns);
-            if end_ns >= t_ns + GRID_NS {
-                k += 1;
+        while k < self.refractory.pixels.len() {
+            let (x, y, end_ns) = self.refractory.pixels[k];
+            let again_ns = if end_ns < t_ns + GRID_NS {
+                self.release_one(touches, (x, y), end_ns, t_ns, out)
+            } else {
+                None
+            };
+            if let Some(end_ns) = again_ns {
+                self.refractory.pixels[k].2 = end_ns;
+            } else if end_ns <= t_ns {
+                self.refractory.remove(k);
                 continue;
             }
-            self.held.swap_remove(k);
-            let (change, c) = see(u, v);
-            let us = ((end_ns - t_ns) / NS_PER_US).max(0);
-            let i = self.index(u, v);
-            self.skin[i].held = false;
-            self.skin[i].reference = 1.0 + change.at_us(us) * c;
-            self.skin[i].set_next(c);
-            // Emitting may hold the pixel again, at the list's end, until a later step.
-            self.emit((u, v), c, change, us, out);
-            let (low, high) = (self.skin[i].low, self.skin[i].high);
-            self.low_mm[u] = self.low_mm[u].max(bound(u, low));
-            self.high_mm[u] = self.high_mm[u].min(bound(u, high));
+            k += 1;
         }
     }
 
-    /// Emits all events of one pixel of contrast `c` from `from_us` to the end of the step.
-    pub(super) fn emit(
+    /// Releases one pixel if it is held. Returns the end of its next refractory time if it emits at once.
+    fn release_one(
+        &mut self,
+        touches: &mut Touches,
+        (x, y): (u16, u16),
+        end_ns: i64,
+        t_ns: i64,
+        out: &mut Vec<PixelEvent>,
+    ) -> Option<i64> {
+        let u = usize::from(x);
+        let v = usize::from(y).checked_sub(self.rows.start)?;
+        if v >= self.rows.len() {
+            return None;
+        }
+        let pixel = self.block(u, v);
+        if self.bounds(pixel).0.is_finite() {
+            // It ended within the step of its event.
+            return None;
+        }
+        touches.look(u);
+        let light = touches.light(v);
+        let us = ((end_ns - t_ns) / NS_PER_US).max(0);
+        self.set_reference(pixel, at_us(light, us));
+        let again_ns = self.emit((u, v), light, t_ns, us, out);
+        // What has changed since the last evaluation may change back.
+        let (up, down) = self.bounds(pixel);
+        let left = (up - light[1]).min(light[1] - down) as f32;
+        let slack = left / (touches.most(v) + f32::MIN_POSITIVE) - touches.change(u);
+        self.slack[u] = lesser(self.slack[u], slack);
+        self.margin = lesser(self.margin, slack - touches.change(u));
+        again_ns
+    }
+
+    /// Emits the events of one column and stores the least change of its light that causes the next one.
+    fn evaluate(&mut self, touches: &mut Touches, u: usize, t_ns: i64, out: &mut Vec<PixelEvent>) {
+        let most = touches.evaluate(u);
+        let blocks = self.block(u, 0).0..self.block(u + 1, 0).0;
+        let column = &mut self.column;
+        let pixels = &self.pixels[blocks.clone()];
+        let mut least = self.instructions.run(
+            #[inline(always)]
+            || {
+                touches.column(column);
+                least_slack(column, pixels)
+            },
+        );
+        if least < 0.0 {
+            let mut crossed = self.instructions.run(
+                #[inline(always)]
+                || crossed_blocks(column, pixels),
+            );
+            while crossed != 0 {
+                let block = crossed.trailing_zeros() as usize;
+                crossed &= crossed - 1;
+                for v in block * LANES..self.rows.len().min((block + 1) * LANES) {
+                    let light = touches.light(v);
+                    if let Some(end_ns) = self.emit((u, v), light, t_ns, 0, out) {
+                        let (x, y) = (u as u16, (v + self.rows.start) as u16);
+                        self.refractory.set(x, y, end_ns);
+                    }
+                }
+            }
+            let (column, pixels) = (&self.column, &self.pixels[blocks]);
+            least = self.instructions.run(
+                #[inline(always)]
+                || least_slack(column, pixels),
+            );
+        }
+        self.slack[u] = lesser(least, most);
+    }
+
+    /// Emits all events of one pixel, whose light changes linearly during the step, from `from_us` to its end. Returns the end of
+    /// the last one's refractory time.
+    fn emit(
         &mut self,
         (u, v): (usize, usize),
-        c: f64,
-        change: Change,
+        light: [f64; 2],
+        t_ns: i64,
         mut from_us: i64,
         out: &mut Vec<PixelEvent>,
-    ) {
-        let i = self.index(u, v);
+    ) -> Option<i64> {
+        let pixel = self.block(u, v);
+        let (x, y) = (u as u16, (v + self.rows.start) as u16);
+        let refractory_us = self.refractory_ns / NS_PER_US;
+        let mut last_us = None;
         loop {
-            let pixel = &mut self.skin[i];
-            let (bound, rising) = if change.to > pixel.high {
-                (pixel.high, true)
-            } else if change.to < pixel.low {
-                (pixel.low, false)
+            let (up, down) = self.bounds(pixel);
+            let (bound, polarity) = if light[1] > up {
+                (up, Polarity::On)
+            } else if light[1] < down {
+                (down, Polarity::Off)
             } else {
-                return;
+                break;
             };
-            let part = (bound - change.from) / (change.to - change.from);
+            let part = (bound - light[0]) / (light[1] - light[0]);
             let us = if part > 0.0 {
                 (part * STEP_US as f64) as i64
             } else {
                 0
             };
             let us = us.clamp(from_us, STEP_US - 1);
-            let t_ns = change.t_ns + us * NS_PER_US;
+            let t_ns = t_ns + us * NS_PER_US;
             out.push(PixelEvent {
                 t_ns,
-                x: u as u16,
-                y: v as u16,
-                polarity: Polarity::from_bit(rising == (c >= 0.0)),
+                x,
+                y,
+                polarity,
             });
-            self.last_ns[v * usize::from(SENSOR_WIDTH) + u] = t_ns;
-            let end_us = us + self.refractory_ns / NS_PER_US;
-            if end_us >= STEP_US {
-                pixel.hold();
-                self.held.push((u as u16, v as u16));
-                return;
+            last_us = Some(us);
+            from_us = us + refractory_us;
+            if from_us >= STEP_US {
+                self.hold(pixel);
+                break;
             }
-            from_us = end_us;
-            pixel.reference = 1.0 + change.at_us(end_us) * c;
-            pixel.set_next(c);
+            self.set_reference(pixel, at_us(light, from_us));
         }
-    }
-
-    fn set_next_in_column(&mut self, dent: &Dent, u: usize) {
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        if !dent.rows.is_empty() {
-            for pixel in &self.skin[self.index(u, dent.rows.start)..self.index(u, dent.rows.end)] {
-                low = low.max(pixel.low);
-                high = high.min(pixel.high);
-            }
-        }
-        self.low_mm[u] = dent.depth_of_loss(u, low);
-        self.high_mm[u] = dent.depth_of_loss(u, high);
+        last_us.map(|us| t_ns + us * NS_PER_US + self.refractory_ns)
     }
 }
 
-fn loss_of(dent: &Dent, ramp: Ramp, u: usize) -> Change {
-    Change {
-        t_ns: ramp.t_ns,
-        from: dent.lost(u, ramp.from_mm),
-        to: dent.lost(u, ramp.to_mm),
-    }
+/// Light `us` after the start of a step.
+fn at_us(light: [f64; 2], us: i64) -> f64 {
+    light[0] + (light[1] - light[0]) * (us as f64 / STEP_US as f64)
 }
