@@ -2,7 +2,9 @@
 
 use rustix::time::{ClockId, clock_gettime};
 use skinrig_analysis::AnalysisError;
-use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
+use skinrig_analysis::tradeoff::{
+    Cost, Measured, Plan, Requirement, Selection, Unselected, measure,
+};
 use skinrig_model::RunHeader;
 use skinrig_report::tradeoff::{Rows, label, page, protocol_lines, terminal_table};
 use skinrig_results::Origin;
@@ -36,45 +38,64 @@ impl From<CostKind> for Cost {
 /// A requirement and the choice that meets it.
 struct Recommendation<'a> {
     question: String,
-    row: Option<&'a Row>,
+    found: Result<Selection<'a>, Unselected>,
 }
 
-fn recommendations<'a>(result: &'a Tradeoff, args: &TradeoffArgs) -> Vec<Recommendation<'a>> {
+fn recommendations<'a>(measured: &'a Measured, args: &TradeoffArgs) -> Vec<Recommendation<'a>> {
     let target = args.target_rmse.map(|mm| Recommendation {
         question: format!(
             "cheapest ({}) whose RMSE is at most {mm} mm at the upper end of its 95 % interval",
             cost_name(args.cost)
         ),
-        row: result.cheapest(mm, args.cost.into()),
+        found: measured.select(Requirement::Target(mm, args.cost.into())),
     });
     let budget = args.budget.map(|s| Recommendation {
         question: format!(
             "most accurate within {} µs of CPU time per press",
             (s * 1e9).round() / 1e3
         ),
-        row: result.most_accurate(s * 1e6, Cost::Cpu),
+        found: measured.select(Requirement::Budget(s * 1e6, Cost::Cpu)),
     });
     target.into_iter().chain(budget).collect()
+}
+
+fn bound(bound: Option<f64>) -> String {
+    bound.map_or("-".to_owned(), |mm| format!("{mm:.2}"))
+}
+
+/// Why there is no recommendation.
+fn refusal(unselected: &Unselected) -> String {
+    match unselected {
+        Unselected::Target(rmse) => format!(
+            "none: the most accurate has RMSE {} mm [{}, {}] on the {} presses that confirm",
+            bound(rmse.value),
+            bound(rmse.low),
+            bound(rmse.high),
+            rmse.n
+        ),
+        other => format!("none: {other}"),
+    }
 }
 
 /// Prints a recommendation with its requirement and the lines of the protocol that select it. `own` lists the changes of a variant.
 fn print_recommendation(recommendation: &Recommendation<'_>, own: Option<&str>) {
     outln!("{}:", recommendation.question);
-    let Some(row) = recommendation.row else {
-        outln!("  none of the choices tried\n");
-        return;
+    let (row, rmse) = match &recommendation.found {
+        Ok(found) => (found.row, &found.confirmed_mm),
+        Err(unselected) => {
+            outln!("  {}\n", refusal(unselected));
+            return;
+        }
     };
     let name = match own {
         _ if !row.overrides.is_empty() => label(&row.choice),
         Some(own) => own.to_owned(),
         None => "the session's own settings".to_owned(),
     };
-    let bound = |bound: Option<f64>| bound.map_or("-".to_owned(), |mm| format!("{mm:.2}"));
-    let rmse = &row.rmse_mm;
     let paint = Paint::new(crate::terminal::is_coloured(&std::io::stdout()));
     let chosen = format!("{name}: RMSE {} mm", bound(rmse.value));
     outln!(
-        "  {}, 95 % interval [{}, {}], n {};\n  {:.3} ms of CPU time per press\n",
+        "  {}, 95 % interval [{}, {}], n {} that did not choose;\n  {:.3} ms of CPU time per press\n",
         paint.bold(&chosen),
         bound(rmse.low),
         bound(rmse.high),
@@ -138,18 +159,22 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     let phase = Phase::reading("measuring every choice", aligned.events.bytes_read());
     let measured = measure(&aligned.input, &aligned.events, plan, &mut thread_cpu_s);
     drop(phase);
-    let result = measured.map_err(|e| match e {
+    let measured = measured.map_err(|e| match e {
         AnalysisError::Invalid(_) => Failure::limit(e),
         other => Failure::input(other),
     })?;
-    let recommendations = recommendations(&result, args);
+    let recommendations = recommendations(&measured, args);
+    let result = &measured.tradeoff;
     let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "variant": variant, "tradeoff": result });
     let found = recommendations.iter().map(|a| {
+        let found = a.found.as_ref().ok();
+        let row = found.map(|f| f.row);
         serde_json::json!({
             "question": a.question,
-            "choice": a.row.map(|r| label(&r.choice)),
-            "row": a.row,
-            "protocol": a.row.map(protocol_lines),
+            "choice": row.map(|r| label(&r.choice)),
+            "row": row,
+            "confirmed_mm": found.map(|f| f.confirmed_mm),
+            "protocol": row.map(protocol_lines),
         })
     });
     document["answers"] = serde_json::Value::Array(found.collect());
@@ -163,7 +188,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         .file_name()
         .map(|n| n.to_string_lossy().into_owned());
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
-    let html = page(&result, &name.unwrap_or_default(), &rig);
+    let html = page(result, &name.unwrap_or_default(), &rig);
     write(&html_path, html.as_bytes())?;
     write(&json_path, text.as_bytes())?;
     if output.json {
@@ -175,7 +200,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
             .iter()
             .for_each(|a| print_recommendation(a, own.as_deref()));
         let table = terminal_table(
-            &result,
+            result,
             if output.verbose {
                 Rows::All
             } else {
@@ -188,11 +213,12 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         outln!("\npage     {}", html_path.display());
         outln!("results  {}", json_path.display());
     }
-    match recommendations.iter().find(|a| a.row.is_none()) {
+    let unmet =
+        |a: &Recommendation<'_>| Some((a.question.clone(), refusal(a.found.as_ref().err()?)));
+    match recommendations.iter().find_map(unmet) {
         None => Ok(Exit::Ok),
-        Some(unmet) => Err(Failure::limit(format!(
-            "expected a choice that is {}, found none among the {} tried\n  next: relax the requirement, or try --full",
-            unmet.question,
+        Some((question, why)) => Err(Failure::limit(format!(
+            "expected a choice that is {question}, found {why}; {} tried\n  next: relax the requirement, press more locations, or try --full",
             result.rows.len()
         ))),
     }

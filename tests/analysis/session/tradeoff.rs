@@ -1,6 +1,6 @@
 //! Every row of a tradeoff is what an analysis with its settings says, to the last bit.
 
-use skinrig_analysis::tradeoff::{Choice, Cost, Plan, measure};
+use skinrig_analysis::tradeoff::{Choice, Cost, Plan, Requirement, measure};
 use skinrig_analysis::{SessionInput, analyze};
 use skinrig_model::{AnalysisSettings, CalibrationModel};
 
@@ -34,7 +34,9 @@ fn with_settings(input: &SessionInput, settings: AnalysisSettings) -> SessionInp
 fn each_row_equals_an_analysis_with_its_settings() {
     let (mut input, memory) = session();
     input.settings.bootstrap_resamples = 50;
-    let result = measure(&input, &memory, PLAN, &mut ticking()).unwrap();
+    let result = measure(&input, &memory, PLAN, &mut ticking())
+        .unwrap()
+        .tradeoff;
     assert_eq!((result.calibrating, result.scored), ((25, 25), (25, 25)));
     assert_eq!(result.rows[0].choice, Choice::of(&input.settings));
     assert_ne!(result.model, CalibrationModel::Auto);
@@ -75,8 +77,9 @@ fn results_do_not_depend_on_times_and_costs_follow_the_choice() {
     let (mut input, memory) = session();
     input.settings.bootstrap_resamples = 20;
     let mut still = || 0.0;
-    let one = measure(&input, &memory, PLAN, &mut ticking()).unwrap();
-    let two = measure(&input, &memory, PLAN, &mut still).unwrap();
+    let measured = measure(&input, &memory, PLAN, &mut ticking()).unwrap();
+    let one = &measured.tradeoff;
+    let two = measure(&input, &memory, PLAN, &mut still).unwrap().tradeoff;
     for (a, b) in one.rows.iter().zip(&two.rows) {
         assert_eq!(
             (a.choice, a.rmse_mm, a.bytes_per_s),
@@ -113,8 +116,11 @@ fn results_do_not_depend_on_times_and_costs_follow_the_choice() {
     );
     assert_eq!(thinned_away.rmse_mm.value, None);
     assert!(one.rows.iter().any(|r| r.fronts.contains(&Cost::Bytes)));
-    let found = one.most_accurate(own.delay_ms, Cost::Delay).unwrap();
-    assert!(found.rmse_mm.value <= own.rmse_mm.value);
+    let within_own = Requirement::Budget(own.delay_ms, Cost::Delay);
+    let found = measured.select(within_own).unwrap();
+    assert!(found.row.delay_ms <= own.delay_ms && found.row.competes);
+    // Of 25 locations 8 choose.
+    assert_eq!(found.confirmed_mm.n, 17);
 }
 
 #[test]

@@ -1,6 +1,6 @@
-//! Pareto fronts and selection of a row.
+//! Pareto fronts.
 
-use super::rows::{Cost, Row, Tradeoff};
+use super::rows::{Cost, Tradeoff};
 
 /// For points (error, cost), true if no other point dominates: none is as good in both and better in one. `None` does not
 /// compete.
@@ -47,33 +47,4 @@ pub(super) fn mark_fronts(result: &mut Tradeoff) {
             }
         }
     }
-}
-
-impl Tradeoff {
-    /// Cheapest competing row whose upper end of the 95 % interval of the RMSE is at most `target_mm`; ties go to the most
-    /// accurate.
-    #[must_use]
-    pub fn cheapest(&self, target_mm: f64, cost: Cost) -> Option<&Row> {
-        let meets = |r: &&Row| r.competes && r.rmse_mm.high.is_some_and(|high| high <= target_mm);
-        let rank = |r: &Row| (cost.of(r), r.rmse_mm.value.unwrap_or(f64::INFINITY));
-        self.rows
-            .iter()
-            .filter(meets)
-            .min_by(|a, b| order(rank(a), rank(b)))
-    }
-
-    /// Competing row with the smallest RMSE at a cost of at most `budget`; ties go to the cheapest.
-    #[must_use]
-    pub fn most_accurate(&self, budget: f64, cost: Cost) -> Option<&Row> {
-        let fits = |r: &&Row| r.competes && cost.of(r) <= budget;
-        let rank = |r: &Row| (r.rmse_mm.value.unwrap_or(f64::INFINITY), cost.of(r));
-        self.rows
-            .iter()
-            .filter(fits)
-            .min_by(|a, b| order(rank(a), rank(b)))
-    }
-}
-
-fn order(a: (f64, f64), b: (f64, f64)) -> std::cmp::Ordering {
-    a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
 }

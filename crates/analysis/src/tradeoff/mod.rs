@@ -12,9 +12,13 @@ mod rows;
 #[cfg(test)]
 mod tests;
 mod timing;
+mod winner;
+#[cfg(test)]
+mod winner_tests;
 
 pub use choice::{Choice, Region};
 pub use rows::{Cost, Row, Tradeoff};
+pub use winner::{Measured, Requirement, Selection, Unselected};
 
 use skinrig_model::{AnalysisSettings, CalibrationModel, PressRole, ReductionSettings};
 
@@ -48,7 +52,7 @@ pub fn measure(
     source: &dyn EventSource,
     plan: Plan,
     stopwatch: &mut dyn FnMut() -> f64,
-) -> Result<Tradeoff, AnalysisError> {
+) -> Result<Measured, AnalysisError> {
     let session = &input.settings;
     // Keep whole presses, and skip the studies of the analysis.
     let mut reading = input.clone();
@@ -77,11 +81,13 @@ pub fn measure(
     let press_s = replay.press_s(&reading.settings);
     let mut rows = Vec::new();
     let mut candidates = Vec::new();
+    let mut errors = Vec::new();
     for choice in choice::sweep(Choice::of(session), plan.full) {
         let crop = replay.region_rows(&reading.settings, choice.region);
         let settings = choice.settings(session, crop, model, locator);
         let outcome = replay.run(&settings);
         let bits = bits_per_event(&settings);
+        errors.push(outcome.errors);
         rows.push(Row {
             choice,
             rows: crop,
@@ -110,7 +116,7 @@ pub fn measure(
         (row.cpu_us, row.cpu_range_us) = (time.median_us, time.range_us);
     }
     let own = rows[0].located_rate.value.unwrap_or(0.0);
-    let mut result = Tradeoff {
+    let mut tradeoff = Tradeoff {
         settings: session.clone(),
         model,
         locator,
@@ -124,8 +130,8 @@ pub fn measure(
         press_s,
         rows,
     };
-    front::mark_fronts(&mut result);
-    Ok(result)
+    front::mark_fronts(&mut tradeoff);
+    Ok(Measured { tradeoff, errors })
 }
 
 /// Bits per event of the settings; halving columns or rows shortens a pixel address by one bit.

@@ -3,6 +3,7 @@
 use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole};
 
 use super::choice::Region;
+use super::winner::PressErrors;
 use crate::accumulate::{EventCounts, press_view};
 use crate::analyze::{by_row, lost_rows};
 use crate::estimators::{PressEstimator, Thinning};
@@ -33,6 +34,8 @@ pub(crate) struct Replay<'a> {
 pub(super) struct Outcome {
     pub metrics: Metrics,
     pub penalised: PenalisedRmse,
+    /// Errors of the presses in the metrics.
+    pub errors: PressErrors,
     pub located: LocatedPresses,
     /// Events of both cameras in the window, mean over the retained scored presses.
     pub events_per_press: f64,
@@ -170,7 +173,15 @@ impl<'a> Replay<'a> {
         });
         let located = locate_presses(&input, observations, Effort::Positions, &mut Vec::new());
         let scores = ScoreSet::from_presses(&located.presses, &input.outcomes);
+        let counting = scores.presses().iter().filter(|p| p.valid);
+        let errors = counting
+            .filter_map(|p| {
+                let (_, [x, y]) = p.found?;
+                Some((p.location, libm::hypot(x, y)))
+            })
+            .collect();
         Outcome {
+            errors,
             metrics: metrics(
                 &scores,
                 Exclusions::Applied,

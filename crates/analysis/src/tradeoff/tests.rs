@@ -6,7 +6,7 @@ use skinrig_model::{CalibrationModel, Locator};
 use super::*;
 use crate::result::Estimate;
 
-fn row(rmse: Option<f64>, cost: f64, located: f64) -> Row {
+pub(super) fn row(rmse: Option<f64>, cost: f64, located: f64) -> Row {
     let estimate = |value: Option<f64>| Estimate {
         value,
         low: value.map(|v| 0.9 * v),
@@ -31,7 +31,7 @@ fn row(rmse: Option<f64>, cost: f64, located: f64) -> Row {
     }
 }
 
-fn tradeoff(rows: Vec<Row>) -> Tradeoff {
+pub(super) fn tradeoff(rows: Vec<Row>) -> Tradeoff {
     let mut result = Tradeoff {
         locator: Locator::Geometry,
         settings: AnalysisSettings::default(),
@@ -82,33 +82,54 @@ proptest! {
         target in 0.5..9.0f64,
         budget in 0.5..9.0f64,
     ) {
-        let result = tradeoff(rows);
-        let meets = |r: &&Row| r.competes && r.rmse_mm.high.unwrap() <= target;
-        match result.cheapest(target, Cost::Cpu) {
-            None => prop_assert!(!result.rows.iter().any(|r| meets(&r))),
-            Some(found) => {
-                prop_assert!(meets(&found));
-                prop_assert!(result.rows.iter().filter(meets).all(|r| r.cpu_us >= found.cpu_us));
-            }
+        let measured = proportional(tradeoff(rows));
+        let all = &measured.tradeoff.rows;
+        // Errors at all locations are proportional to the RMSE, and so are the ends of intervals.
+        let error = |r: &Row| r.rmse_mm.value.unwrap();
+        if let Ok(found) = measured.select(Requirement::Target(target, Cost::Cpu)) {
+            let factor = found.confirmed_mm.high.unwrap() / error(found.row);
+            prop_assert!(found.row.competes && found.confirmed_mm.high.unwrap() <= target);
+            let meets = |r: &&Row| r.competes && factor * error(r) <= target - 1e-9;
+            prop_assert!(all.iter().filter(meets).all(|r| r.cpu_us >= found.row.cpu_us));
         }
         let fits = |r: &&Row| r.competes && r.cpu_us <= budget;
-        match result.most_accurate(budget, Cost::Cpu) {
-            None => prop_assert!(!result.rows.iter().any(|r| fits(&r))),
-            Some(found) => {
-                prop_assert!(fits(&found));
-                let error = found.rmse_mm.value;
-                prop_assert!(result.rows.iter().filter(fits).all(|r| r.rmse_mm.value >= error));
-                prop_assert!(found.fronts.contains(&Cost::Cpu), "the best within a budget is on the front");
+        match measured.select(Requirement::Budget(budget, Cost::Cpu)) {
+            Err(_) => prop_assert!(!all.iter().any(|r| fits(&r))),
+            Ok(found) => {
+                prop_assert!(fits(&found.row));
+                prop_assert!(all.iter().filter(fits).all(|r| error(r) >= error(found.row)));
+                prop_assert!(found.row.fronts.contains(&Cost::Cpu), "the best within a budget is on the front");
             }
         }
     }
 }
 
+/// Errors at 12 locations for every row.
+fn proportional(tradeoff: Tradeoff) -> Measured {
+    let errors = |row: &Row| {
+        let each = row.rmse_mm.value.into_iter();
+        each.flat_map(|e| (0..12u32).map(move |l| (l, e * (0.9 + 0.1 * f64::from(l % 3)))))
+            .collect()
+    };
+    Measured {
+        errors: tradeoff.rows.iter().map(errors).collect(),
+        tradeoff,
+    }
+}
+
 #[test]
-fn an_rmse_without_an_interval_meets_no_target() {
-    let mut unsure = row(Some(1.0), 1.0, 1.0);
-    unsure.rmse_mm.high = None;
-    assert!(tradeoff(vec![unsure]).cheapest(5.0, Cost::Cpu).is_none());
+fn too_few_locations_or_resamples_select_nothing() {
+    let target = Requirement::Target(5.0, Cost::Cpu);
+    let one = || tradeoff(vec![row(Some(1.0), 1.0, 1.0)]);
+    let mut unsure = proportional(one());
+    assert!(unsure.select(target).is_ok());
+    unsure.tradeoff.settings.bootstrap_resamples = 0;
+    assert!(matches!(unsure.select(target), Err(Unselected::Target(_))));
+    let mut few = proportional(one());
+    few.errors[0].truncate(8);
+    assert_eq!(few.select(target), Err(Unselected::Locations(8)));
+    few.errors[0].clear();
+    assert_eq!(few.select(target), Err(Unselected::Locations(0)));
 }
 
 #[test]

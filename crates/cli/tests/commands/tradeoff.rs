@@ -4,11 +4,17 @@ use serde_json::Value;
 
 use crate::support::{Lab, skinrig, text};
 
+/// Nine places: a third of them chooses, the others confirm.
+const PLACES: &str = "path.points=[[10 mm, 2 mm], [-10 mm, 18 mm], [0 mm, -18 mm], [25 mm, 17 mm], [10 mm, 20 mm], \
+                      [-10 mm, 2 mm], [20 mm, -8 mm], [0 mm, 8 mm], [15 mm, 10 mm]]";
+
 /// Records a campaign whose first repetition calibrates.
 fn session(lab: &Lab) -> String {
     text(&lab.record(
         "s",
         &[
+            "--set",
+            PLACES,
             "--set",
             "evaluation.calibrate=[1]",
             "--set",
@@ -78,6 +84,7 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
         );
     }
     assert!(output["answers"][0]["row"]["cpu_us"].as_f64().unwrap() > 0.0);
+    assert_eq!(output["answers"][0]["confirmed_mm"]["n"], 6);
     let page = std::fs::read_to_string(output["files"]["page"].as_str().unwrap()).unwrap();
     assert!(page.contains("<svg") && page.contains("</html>"), "{page}");
 }
@@ -103,7 +110,7 @@ fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
     );
     assert!(output.out.contains("streaming f32"), "{}", output.out);
     // The answer comes before the table.
-    let answer = output.out.find("none of the choices tried").unwrap();
+    let answer = output.out.find("none: the most accurate has RMSE").unwrap();
     assert!(answer < output.out.find("choices tried on").unwrap());
     let budget = ["tradeoff", &session, "--repeats", "1", "--budget", "10s"];
     let met = skinrig(&budget).code(0).out;
@@ -113,7 +120,12 @@ fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
         "{met}"
     );
     let chosen: String = lines.take(2).collect();
-    for part in [": RMSE ", " mm, 95 % interval [", ", n ", " ms of CPU time"] {
+    for part in [
+        ": RMSE ",
+        " mm, 95 % interval [",
+        ", n 6 that did not choose",
+        " ms of CPU time",
+    ] {
         assert!(chosen.contains(part), "{part}: {chosen}");
     }
     skinrig(&["tradeoff", &session, "--budget", "5 mm"])
