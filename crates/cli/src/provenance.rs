@@ -6,7 +6,7 @@ use skinrig_analysis::Analysis;
 use skinrig_model::{HostTime, InterruptionReason, PressVerdict, RunHeader, Setting};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
-use skinrig_results::Origin;
+use skinrig_results::{Origin, differences_from_optical};
 
 /// Reads the provenance block of a session.
 ///
@@ -88,6 +88,7 @@ pub(crate) fn provenance(
         seed: header.seed,
         rig_kind: header.rig_kind.clone(),
         rig_name: rig_name(reader, header)?,
+        differences_from_optical: differences_from_optical(header),
         simulated: origin == Some(Origin::Simulated),
         emulated: origin == Some(Origin::Emulated),
         preflight: reader.preflight()?,

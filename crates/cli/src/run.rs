@@ -235,12 +235,13 @@ pub(crate) fn simulated(
     let faults = [&protocol.faults[..], &args.faults].concat();
     if !output.json {
         outln!("{summary}");
-        let needs: Vec<&str> = protocol
-            .scene
-            .needs
+        let scene = &protocol.scene;
+        let needs = scene.needs.iter().map(|need| need.name().to_owned());
+        let tolerances = scene
+            .tolerances
             .iter()
-            .map(|need| need.name())
-            .collect();
+            .map(|t| format!("{} within {} {}", t.figure.name(), t.most, t.figure.unit()));
+        let needs: Vec<String> = needs.chain(tolerances).collect();
         let needed_for = if needs.is_empty() {
             String::new()
         } else {

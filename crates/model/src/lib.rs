@@ -11,6 +11,7 @@ pub mod fault;
 pub mod frame;
 pub mod id;
 pub mod lens;
+pub mod level_bias;
 pub mod limit;
 pub mod notification;
 mod number;

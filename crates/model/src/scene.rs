@@ -133,13 +133,3 @@ impl SceneNeed {
         }
     }
 }
-
-/// The cheapest level that satisfies every need; [`SimLevel::Kinematic`] without needs.
-#[must_use]
-pub fn cheapest_level(needs: &[SceneNeed]) -> SimLevel {
-    needs
-        .iter()
-        .map(|n| n.level())
-        .max()
-        .unwrap_or(SimLevel::Kinematic)
-}

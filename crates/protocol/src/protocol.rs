@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 use skinrig_model::{
     AnalysisSettings, CameraModel, HostDuration, MarkKind, Point2, Point3, PressRole, SceneNeed,
-    SimLevel, Skin,
+    SimLevel, Skin, level_bias::Tolerance,
 };
 
 use skinrig_settings::{Location, Settings};
@@ -105,10 +105,13 @@ pub struct Prototype {
 /// A simulated rig.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
-    /// The level to simulate: the named one, or the cheapest that satisfies the needs.
+    /// The level to simulate: the named one, or the cheapest that satisfies the needs and tolerances.
     pub level: SimLevel,
     /// The requirements from the protocol.
     pub needs: Vec<SceneNeed>,
+    /// How far the level may be from the optical one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tolerances: Vec<Tolerance>,
     /// True if the protocol sets the level explicitly.
     pub level_is_named: bool,
     /// The skin, if it differs from the published one.

@@ -1,9 +1,11 @@
 //! Owns the description of a session's origin, as the report shows it.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use skinrig_model::level_bias::{LevelBias, SceneFigure};
 use skinrig_model::{InvalidReason, LostTime, PreflightCheck, RunEnd};
 
 /// Origin of the numbers of a report. The report shows empty strings as "not recorded".
@@ -34,6 +36,9 @@ pub struct Provenance {
     pub rig_kind: String,
     /// Name of the rig, with the level of a simulated one.
     pub rig_name: String,
+    /// Measured differences of the simulation level from the optical one, as known when the session was recorded.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub differences_from_optical: BTreeMap<SceneFigure, LevelBias>,
     /// True for a simulated rig, which the report states.
     pub simulated: bool,
     /// True for an emulated bench, which the report states.

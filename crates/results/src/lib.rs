@@ -24,7 +24,7 @@ mod window;
 pub use earlier_mismatch::EarlierMismatch;
 pub use error::ResultsError;
 pub use events::{Rescan, SessionEvents};
-pub use origin::Origin;
+pub use origin::{Origin, differences_from_optical};
 pub use rig_document::RigDocument;
 pub use session::Session;
 pub use settings::AnalysisOptions;

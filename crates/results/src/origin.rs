@@ -1,9 +1,11 @@
 //! What a session's data come from: hardware, stand-ins for it, or a simulation.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde_json::Value;
 use skinrig_model::RunHeader;
+use skinrig_model::level_bias::{LevelBias, SceneFigure};
 
 /// What a session's data come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +52,14 @@ impl Origin {
             Self::Imported => "imported",
         }
     }
+}
+
+/// Measured differences of a simulated session's level from the optical one, as known when it was recorded; empty for other
+/// sessions, the optical level itself, and levels without events.
+#[must_use]
+pub fn differences_from_optical(header: &RunHeader) -> BTreeMap<SceneFigure, LevelBias> {
+    let document: Value = serde_json::from_str(&header.rig_json).unwrap_or_default();
+    serde_json::from_value(document["rig"]["against_optical"].clone()).unwrap_or_default()
 }
 
 impl fmt::Display for Origin {

@@ -1,6 +1,7 @@
 //! Assembles a simulated rig.
 
 use skinrig_device::{CameraSettings, EventCamera, Rig, TriggerBox};
+use skinrig_model::level_bias::{SceneFigure, level_bias};
 use skinrig_model::{CameraId, LensKind, RigGeometry, SimLevel, StereoGeometry};
 
 use crate::camera::{PixelFactory, SimCamera};
@@ -176,6 +177,16 @@ pub fn describe(config: &SimConfig) -> String {
             "dead_share": g.dead_share,
             "strength_spread": g.strength_spread,
         });
+    }
+    let against: serde_json::Map<_, _> = SceneFigure::ALL
+        .into_iter()
+        .filter_map(|figure| {
+            let bias = level_bias(config.level, figure)?;
+            Some((figure.name().to_owned(), serde_json::json!(bias)))
+        })
+        .collect();
+    if config.level != SimLevel::Optical && !against.is_empty() {
+        value["against_optical"] = serde_json::Value::Object(against);
     }
     if config.level == SimLevel::Optical {
         value["optical"] = serde_json::json!(config.optical);

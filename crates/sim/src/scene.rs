@@ -3,7 +3,9 @@
 //! The world moves the tip; a [`PixelModel`] converts the tip's path into the events of one camera. Both use *world time*: nanoseconds of
 //! the rig's host clock. The camera's own clock is applied later.
 
-use skinrig_model::{CameraId, CameraModel, Point3, Polarity, Skin, SkinOutline};
+use std::ops::Range;
+
+use skinrig_model::{CameraId, CameraModel, Point3, Polarity, SENSOR_HEIGHT, Skin, SkinOutline};
 
 use crate::contacts::Contacts;
 use crate::random::{Purpose, derive_seed};
@@ -66,6 +68,14 @@ pub struct SceneConfig {
 }
 
 impl SceneConfig {
+    /// Rows of the sensor that see the skin.
+    #[must_use]
+    pub(crate) fn rows(&self) -> Range<usize> {
+        let first = usize::from(self.skin_rows.0);
+        let end = (usize::from(self.skin_rows.1) + 1).min(usize::from(SENSOR_HEIGHT));
+        first..end.max(first)
+    }
+
     /// Seed of values drawn again at every start.
     #[must_use]
     pub(crate) const fn seed_of_start(&self) -> u64 {

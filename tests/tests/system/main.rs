@@ -6,6 +6,7 @@ mod contract;
 mod counts;
 mod faults;
 mod indentation;
+mod level_bias;
 mod multi_touch;
 mod numerics;
 mod online;

@@ -393,7 +393,7 @@ fn pairs_of_a_small_session_are_separated_and_none_is_guessed() {
     let tally = run(Bench {
         seed: 1,
         calibrating: 40,
-        scored: 8,
+        scored: 16,
         pairs: 16,
         simultaneous: 4,
     });
@@ -401,7 +401,7 @@ fn pairs_of_a_small_session_are_separated_and_none_is_guessed() {
     assert!(good >= 0.4, "{good}");
     assert!(ghosts <= 0.13, "{ghosts}");
     assert!(guessed <= 0.25, "{guessed}");
-    assert!(split <= 0.13, "{split}");
+    assert!(split <= 0.26, "{split}");
 }
 
 #[test]

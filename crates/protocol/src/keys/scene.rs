@@ -1,6 +1,7 @@
 //! Keys of the simulated scene.
 
-use skinrig_model::{HostDuration, Point2, SceneNeed, SimLevel, scene::cheapest_level};
+use skinrig_model::level_bias::{LevelBias, SceneFigure, Tolerance, cheapest_level, level_bias};
+use skinrig_model::{HostDuration, Point2, SceneNeed, SimLevel};
 use skinrig_settings::{Collector, Field, Settings};
 
 use super::camera::NominalCamera;
@@ -13,15 +14,68 @@ const USUAL_NEEDS: [SceneNeed; 2] = [SceneNeed::EventRates, SceneNeed::Localisat
 #[derive(Settings)]
 #[settings(name = "scene", finish = Self::sufficient)]
 pub(crate) struct SceneKeys {
-    /// Properties of the session that its user relies on; `[event_rates, localisation]` when neither `needs` nor `level` is set.
+    /// Properties of the session that its user relies on; `[event_rates, localisation]` when neither `needs`, `tolerances` nor `level` is set.
     #[setting(items = 1..=7, example = "[event_rates, localisation]")]
     needs: Option<Vec<SceneNeed>>,
-    /// The simulation level outright; must be sufficient for `needs`.
+    /// How far figures of the session may be from those of the optical level, as measured over simulated skins.
+    tolerances: Option<ToleranceKeys>,
+    /// The simulation level outright; must be sufficient for `needs` and `tolerances`.
     level: Option<SimLevel>,
     /// A skin other than the published one. Needs the optical level.
     skin: Option<SkinKeys>,
     /// Cameras at other places than in the published setup.
     cameras: Option<SceneCameras>,
+}
+
+/// The most that a cheaper level may differ from the optical one. A level counts as within when the 95 % interval of its measured
+/// difference is.
+#[derive(Settings)]
+#[settings(name = "scene_tolerances", finish = Self::not_empty)]
+pub(crate) struct ToleranceKeys {
+    /// RMSE of the scored presses.
+    #[setting(min = 0.0, max = 100.0, example = "0.2 mm")]
+    localisation_rmse_mm: Option<f64>,
+    /// Median delay from contact to detection.
+    #[setting(min = 0.0, max = 10.0, example = "1 ms")]
+    latency: Option<HostDuration>,
+    /// Events per second while the tip presses.
+    #[setting(min = 0.0, max = 1000.0, example = "10 %")]
+    event_rate_percent: Option<f64>,
+    /// Events per second between presses.
+    #[setting(min = 0.0, max = 1000.0, example = "10 %")]
+    idle_rate_percent: Option<f64>,
+}
+
+impl ToleranceKeys {
+    fn all(&self) -> Vec<Tolerance> {
+        [
+            (SceneFigure::LocalisationRmse, self.localisation_rmse_mm),
+            (
+                SceneFigure::Latency,
+                self.latency.map(|t| t.as_secs_f64() * 1e3),
+            ),
+            (SceneFigure::EventRate, self.event_rate_percent),
+            (SceneFigure::IdleRate, self.idle_rate_percent),
+        ]
+        .into_iter()
+        .filter_map(|(figure, most)| {
+            Some(Tolerance {
+                figure,
+                most: most?,
+            })
+        })
+        .collect()
+    }
+
+    fn not_empty(self, field: &Field, out: &mut Collector) -> Option<Self> {
+        if self.all().is_empty() {
+            let names = SceneFigure::ALL.map(|f| format!("`{}`", f.name()));
+            out.error(field.span, field.path.as_str(), "no tolerance is given")
+                .expected(format!("at least one of {}", names.join(", ")))
+                .found("an empty mapping");
+        }
+        Some(self)
+    }
 }
 
 /// The simulated skin; what is missing is as in the model of the published one (docs/explanation/optical-model.md).
@@ -60,18 +114,21 @@ pub(crate) struct SceneCameras {
 impl SceneKeys {
     /// The scene with its level decided. Cameras aim at `centre` unless the file says otherwise.
     pub(crate) fn scene(self, centre: Point2) -> Scene {
-        let needs = match (self.needs, self.level) {
-            (Some(needs), _) => needs,
-            (None, None) => USUAL_NEEDS.to_vec(),
-            (None, Some(_)) => Vec::new(),
+        let tolerances = self.tolerances.as_ref().map(ToleranceKeys::all);
+        let needs = match (self.needs, self.level, &tolerances) {
+            (Some(needs), ..) => needs,
+            (None, None, None) => USUAL_NEEDS.to_vec(),
+            (None, ..) => Vec::new(),
         };
+        let tolerances = tolerances.unwrap_or_default();
         let skin_level = self.skin.as_ref().map(|_| SimLevel::Optical);
         Scene {
             level: self
                 .level
                 .or(skin_level)
-                .unwrap_or_else(|| cheapest_level(&needs)),
+                .unwrap_or_else(|| cheapest_level(&needs, &tolerances)),
             needs,
+            tolerances,
             level_is_named: self.level.is_some(),
             skin: self.skin.map(SkinKeys::skin),
             cameras: self
@@ -99,7 +156,10 @@ impl SceneKeys {
                 .found(format!("`{level}`"))
                 .help("write `level: optical`, or remove the key: the cheapest sufficient level is chosen");
         }
-        let enough = cheapest_level(needs);
+        if let Some(level) = self.level {
+            self.within_tolerances(level, field, out);
+        }
+        let enough = cheapest_level(needs, &[]);
         if let Some(level) = self.level.filter(|level| *level < enough)
             && let Some(need) = needs.iter().find(|n| n.level() > level)
         {
@@ -112,6 +172,35 @@ impl SceneKeys {
                 ));
         }
         Some(self)
+    }
+}
+
+impl SceneKeys {
+    fn within_tolerances(&self, level: SimLevel, field: &Field, out: &mut Collector) {
+        let tolerances = self.tolerances.as_ref().map(ToleranceKeys::all);
+        let beyond = |t: &Tolerance| !t.allows(level);
+        let Some(tolerance) = tolerances.unwrap_or_default().into_iter().find(beyond) else {
+            return;
+        };
+        let (name, unit) = (tolerance.figure.name(), tolerance.figure.unit());
+        let difference = level_bias(level, tolerance.figure).map_or_else(
+            || "which has no events".to_owned(),
+            |LevelBias { mean, low, high }| {
+                format!("whose difference is {mean} {unit}, 95 % interval [{low}, {high}]")
+            },
+        );
+        let at = field.at("level");
+        out.error(
+            at.span,
+            "scene.level",
+            "the level does not meet the tolerances of the scene",
+        )
+        .expected(format!(
+            "a level within `{name}: {} {unit}` of the optical one",
+            tolerance.most
+        ))
+        .found(format!("`{level}`, {difference}"))
+        .help("remove `level`: the cheapest sufficient level is chosen");
     }
 }
 

@@ -140,6 +140,27 @@ fn impossible_values_across_keys() {
         "`optical`",
     );
     finding(
+        "needs: [event_rates, localisation, optical_error]",
+        "tolerances: {event_rate: 1 %}\n  level: geometric",
+        "scene.level",
+        "the level does not meet the tolerances of the scene",
+        "`event_rate: 1 %` of the optical one",
+    );
+    finding(
+        "needs: [event_rates, localisation, optical_error]",
+        "tolerances: {latency: 10 s}\n  level: kinematic",
+        "scene.level",
+        "the level does not meet the tolerances of the scene",
+        "which has no events",
+    );
+    finding(
+        "needs: [event_rates, localisation, optical_error]",
+        "tolerances: {}",
+        "scene.tolerances",
+        "no tolerance is given",
+        "`localisation_rmse`",
+    );
+    finding(
         "max: [60 mm, 52 mm, 30 mm]",
         "max: [60 mm, -52 mm, 30 mm]",
         "limits.workspace",

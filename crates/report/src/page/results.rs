@@ -1,6 +1,7 @@
 //! Owns the first section of the page: headline and metrics, counts, remarks, exclusions, provenance.
 
 use skinrig_analysis::result::Analysis;
+use skinrig_model::level_bias::{LevelBias, SceneFigure};
 
 use super::{findings, notices};
 use crate::derive;
@@ -244,6 +245,16 @@ fn provenance(p: &Provenance, analysis_version: u32) -> Vec<Fact> {
         code("results SHA-256", &p.results_hash),
         code("command line", &p.command_line),
     ];
+    if !p.differences_from_optical.is_empty() {
+        let difference = |(figure, bias): (&SceneFigure, &LevelBias)| {
+            let LevelBias { mean, low, high } = bias;
+            let (name, unit) = (figure.label(), figure.unit());
+            format!("{name} {mean:+} {unit} [{low}, {high}]")
+        };
+        let all: Vec<String> = p.differences_from_optical.iter().map(difference).collect();
+        let fact = plain("simulated, not optical", &all.join("; "));
+        facts.push(fact.wide(true));
+    }
     if !p.overrides.is_empty() {
         facts.push(code("overrides", &p.overrides.join("  ")));
     }

@@ -10,10 +10,9 @@ use skinrig_model::{CameraModel, SENSOR_WIDTH};
 
 use crate::scene::SceneConfig;
 
-use super::Optics;
 use super::config::OpticalConfig;
 use super::light::{Column, Illumination, Vec2, dot};
-use super::pixels::skin_rows;
+use super::optics::Optics;
 
 /// Step of the integrals across the dent, mm.
 const STEP_MM: f64 = 0.5;
@@ -273,7 +272,8 @@ impl Image {
     /// Gaussian weights of the skin's rows, within the image's extent.
     fn weights(&self, scene: &SceneConfig, centre: f64, sigma: f64) -> Vec<f32> {
         let reach = ROW_SIGMAS * self.sigma;
-        skin_rows(scene)
+        scene
+            .rows()
             .map(|v| v as f64)
             .map(|v| {
                 if (v - self.centre).abs() > reach {

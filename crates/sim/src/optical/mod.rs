@@ -14,6 +14,7 @@ mod contact;
 mod dent;
 mod light;
 mod noise;
+mod optics;
 mod pixels;
 mod refractory;
 #[cfg(test)]
@@ -29,19 +30,10 @@ use skinrig_model::{Point3, Skin};
 use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
-use light::{Column, Illumination};
 use noise::Noise;
+use optics::Optics;
 use pixels::Pixels;
 use touches::Touches;
-
-/// What a dent is made from: the skin, its light, and the camera's columns.
-#[derive(Debug, Clone)]
-struct Optics {
-    scene: SceneConfig,
-    config: OpticalConfig,
-    light: Illumination,
-    columns: Vec<Column>,
-}
 
 /// Pixels of one camera over the optically modelled skin.
 #[derive(Debug, Clone)]
@@ -87,19 +79,12 @@ impl OpticalModel {
 
     /// The model with constants already checked.
     pub(crate) fn build(scene: &SceneConfig, config: OpticalConfig, tips: usize) -> Self {
-        let light = Illumination::new(&scene.outline, &config);
-        let columns = light::columns(&scene.camera, &scene.outline, &light, &config);
+        let optics = Optics::new(scene, config);
         let mut thresholds = Stream::new(scene.seed, Purpose::Pixels, 1);
         let (noise, pixels) = (
-            Noise::new(scene, &config, &columns),
+            Noise::new(scene, &config, &optics.columns),
             Pixels::new(scene, &config, &mut thresholds),
         );
-        let optics = Optics {
-            scene: scene.clone(),
-            config,
-            light,
-            columns,
-        };
         Self {
             touches: Touches::new(&optics, tips),
             optics,

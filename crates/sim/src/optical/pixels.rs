@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
+use skinrig_model::{Polarity, SENSOR_WIDTH};
 use skinrig_simd::InstructionSet;
 
 use crate::random::Stream;
@@ -22,13 +22,6 @@ const STEP_US: i64 = GRID_NS / NS_PER_US;
 /// Lower limit on a pixel's threshold after mismatch, log intensity.
 const LEAST_THRESHOLD: f64 = 0.01;
 const WIDTH: usize = SENSOR_WIDTH as usize;
-
-/// Rows of the sensor that see the skin.
-pub(super) fn skin_rows(scene: &SceneConfig) -> Range<usize> {
-    let first = usize::from(scene.skin_rows.0);
-    let end = (usize::from(scene.skin_rows.1) + 1).min(usize::from(SENSOR_HEIGHT));
-    first..end.max(first)
-}
 
 /// All pixels of a camera. Pixels that see the skin are stored column by column, in blocks of rows.
 #[derive(Debug, Clone)]
@@ -50,7 +43,7 @@ pub(super) struct Pixels {
 
 impl Pixels {
     pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig, random: &mut Stream) -> Self {
-        let rows = skin_rows(scene);
+        let rows = scene.rows();
         let blocks = rows.len().div_ceil(LANES);
         let silent = Block {
             bounds: Rows::SILENT,

@@ -8,11 +8,11 @@ use std::ops::Range;
 
 use skinrig_model::{Point2, SENSOR_WIDTH};
 
-use super::Optics;
 use super::column::{ColumnLight, greater, sensitivity};
 use super::contact::{Contact, Relaxation};
 use super::dent::Dent;
 use super::light::Vec2;
+use super::optics::Optics;
 
 const WIDTH: usize = SENSOR_WIDTH as usize;
 

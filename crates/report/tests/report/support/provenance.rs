@@ -24,6 +24,7 @@ pub(crate) fn provenance() -> Provenance {
         seed: 20_260_302,
         rig_kind: "simulated".into(),
         rig_name: "simulated (geometric)".into(),
+        differences_from_optical: Default::default(),
         simulated: true,
         emulated: false,
         preflight: Vec::new(),

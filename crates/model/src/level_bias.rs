@@ -1,0 +1,168 @@
+//! How far each simulation level is from the optical one, as measured, and the tolerances that a scene sets on that.
+
+use serde::{Deserialize, Serialize};
+
+use crate::scene::{SceneNeed, SimLevel};
+
+/// A figure of a session that a scene can set a tolerance on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SceneFigure {
+    /// RMSE of the scored presses, mm.
+    LocalisationRmse,
+    /// Median delay from contact to detection, ms.
+    Latency,
+    /// Events per second in the press windows, percent of those of the optical level.
+    EventRate,
+    /// Events per second between presses, percent of those of the optical level.
+    IdleRate,
+}
+
+impl SceneFigure {
+    /// All figures.
+    pub const ALL: [Self; 4] = [
+        Self::LocalisationRmse,
+        Self::Latency,
+        Self::EventRate,
+        Self::IdleRate,
+    ];
+
+    /// The name used in protocols.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LocalisationRmse => "localisation_rmse",
+            Self::Latency => "latency",
+            Self::EventRate => "event_rate",
+            Self::IdleRate => "idle_rate",
+        }
+    }
+
+    /// The name in reports.
+    #[must_use]
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::LocalisationRmse => "RMSE",
+            Self::Latency => "median latency",
+            Self::EventRate => "event rate of presses",
+            Self::IdleRate => "event rate between presses",
+        }
+    }
+
+    /// Its unit in protocols.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::LocalisationRmse => "mm",
+            Self::Latency => "ms",
+            Self::EventRate | Self::IdleRate => "%",
+        }
+    }
+}
+
+/// Difference of a level from the optical one, in the figure's unit: the mean over simulated skins and its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LevelBias {
+    /// Mean difference.
+    pub mean: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl LevelBias {
+    const fn new(mean: f64, low: f64, high: f64) -> Self {
+        Self { mean, low, high }
+    }
+
+    /// Whether the whole interval lies within `tolerance` of zero.
+    #[must_use]
+    pub const fn is_within(self, tolerance: f64) -> bool {
+        self.low >= -tolerance && self.high <= tolerance
+    }
+}
+
+/// The geometric level against the optical one, by [`SceneFigure::ALL`]: 20 simulated skins, 25 locations three times, 2 mm deep,
+/// both levels with the same seeds.
+///
+/// `cargo test --release -p skinrig-tests --test system level_bias -- --ignored --nocapture`
+const GEOMETRIC: [LevelBias; 4] = [
+    LevelBias::new(-0.31, -0.37, -0.26),
+    LevelBias::new(-40.43, -41.13, -39.73),
+    LevelBias::new(-19.81, -21.04, -18.57),
+    LevelBias::new(-62.73, -63.97, -61.48),
+];
+
+/// How far `level` is from the optical one in `figure`; `None` if it does not model what the figure needs.
+#[must_use]
+pub const fn level_bias(level: SimLevel, figure: SceneFigure) -> Option<LevelBias> {
+    match level {
+        SimLevel::Kinematic => None,
+        SimLevel::Geometric => Some(GEOMETRIC[figure as usize]),
+        SimLevel::Optical => Some(LevelBias::new(0.0, 0.0, 0.0)),
+    }
+}
+
+/// A tolerance: the level may be at most so far from the optical one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Tolerance {
+    /// The figure.
+    pub figure: SceneFigure,
+    /// In its unit.
+    pub most: f64,
+}
+
+impl Tolerance {
+    /// Whether `level` is certainly within it.
+    #[must_use]
+    pub const fn allows(self, level: SimLevel) -> bool {
+        match level_bias(level, self.figure) {
+            Some(bias) => bias.is_within(self.most),
+            None => false,
+        }
+    }
+}
+
+/// The cheapest level that satisfies every need and tolerance; [`SimLevel::Kinematic`] without any.
+#[must_use]
+pub fn cheapest_level(needs: &[SceneNeed], tolerances: &[Tolerance]) -> SimLevel {
+    let is_enough = |level: &SimLevel| {
+        needs.iter().all(|n| n.level() <= *level) && tolerances.iter().all(|t| t.allows(*level))
+    };
+    SimLevel::ALL
+        .into_iter()
+        .find(is_enough)
+        .unwrap_or(SimLevel::Optical)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_optical_level_meets_every_tolerance_and_the_kinematic_one_none() {
+        for figure in SceneFigure::ALL {
+            let tolerance = Tolerance { figure, most: 0.0 };
+            assert!(tolerance.allows(SimLevel::Optical));
+            let tolerance = Tolerance { figure, most: 1e9 };
+            assert!(!tolerance.allows(SimLevel::Kinematic));
+            assert!(tolerance.allows(SimLevel::Geometric));
+        }
+    }
+
+    #[test]
+    fn the_whole_interval_has_to_lie_within_the_tolerance() {
+        let bias = LevelBias::new(-1.0, -1.5, -0.5);
+        assert!(bias.is_within(1.5) && !bias.is_within(1.4));
+        let bias = LevelBias::new(1.0, 0.5, 1.5);
+        assert!(bias.is_within(1.5) && !bias.is_within(1.4));
+    }
+
+    #[test]
+    fn measured_intervals_contain_their_means() {
+        for bias in GEOMETRIC {
+            assert!(bias.low <= bias.mean && bias.mean <= bias.high);
+        }
+    }
+}
