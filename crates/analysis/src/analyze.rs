@@ -232,6 +232,7 @@ fn analyze_by(
         warnings: [one.warnings, two.warnings, warnings].concat(),
         pictures: [one.pictures, two.pictures].concat(),
         zooms: [one.zooms, two.zooms].concat(),
+        campaign: None,
         motion: None,
     };
     evaluate(&mut analysis, input, &streams, &kept)?;

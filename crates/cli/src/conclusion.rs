@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use skinrig_controller::{Problem, RunFault, RunReport, SinkFault};
-use skinrig_model::{PressRole, PressVerdict, RunEnd};
+use skinrig_model::{PressRole, PressVerdict, RunEnd, StopReason};
 use skinrig_protocol::Plan;
 use skinrig_recorder::{RecorderError, SessionReader};
 
@@ -32,7 +32,7 @@ pub(crate) fn close(
             _ => {}
         }
         let error = RunFault::from(SinkFault::Rejected(error.to_string()));
-        if report.end == RunEnd::Completed && !is_complete {
+        if report.end.is_complete() && !is_complete {
             report.end = RunEnd::fault(error);
         } else if !report.end.faults().contains(&error) {
             // The data of a complete run are on the disk: a missing seal is not a fault of the run.
@@ -105,6 +105,7 @@ pub(crate) fn conclude(
 pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String>, Failure> {
     let kept_message = format!("everything recorded so far is kept: {}", session.display());
     match &report.end {
+        RunEnd::Stopped(StopReason::Decided(_)) => Ok(None),
         RunEnd::Completed => match presses_lost_to_the_rig(session)? {
             Some(lost) => Err(Failure::rig(format!(
                 "{lost}\n  the session is kept: {}\n  next: fix the cause that they name (device, cable, disk), then repeat these presses \

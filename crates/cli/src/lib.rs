@@ -25,6 +25,7 @@ mod import;
 mod inspect;
 mod jog;
 pub mod library;
+mod looks;
 mod man;
 mod new;
 mod notify;
@@ -144,6 +145,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Schema(a) => schema::schema(a),
         Command::Completions(a) => completions::completions(a),
         Command::Man(a) => man::man(a, json),
+        Command::TakeLook(a) => looks::take_look(a),
         Command::SuperviseArm => supervise::supervise(),
         Command::HoldArm(a) => hil::hold::hold(a),
     }

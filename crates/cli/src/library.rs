@@ -185,6 +185,11 @@ pub fn simulate(simulation: Simulation, control: ControlHandle) -> Result<PathBu
         ProtocolSource::File(path) => check::load(path, &overrides)?,
         ProtocolSource::Text(text) => check::load_text(NO_FILE, text, &overrides)?,
     };
+    if checked.plan.stop.is_some() {
+        return Err(Failure::input(
+            "expected a protocol without `stop`, found one: other programs cannot take its looks\n  next: use `skinrig run`",
+        ));
+    }
     let args = RunArgs {
         notify: None,
         protocol: None,

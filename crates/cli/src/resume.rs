@@ -22,6 +22,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::FaultInjector;
 use crate::hil::lease;
 use crate::host::host_name;
+use crate::looks::LookMode;
 use crate::notify::{self, RunMessages};
 use crate::paths;
 use crate::progress::ProgressView;
@@ -267,9 +268,14 @@ fn run_leg(
         .with_faults(FaultInjector::new(&args.faults))
         .notifying(notifier.map(|notifier| RunMessages::new(notifier, &found.header)));
     let settings = bench::settings(&rig.kind);
+    let looks = match found.header.rig_kind.as_str() {
+        "simulated" => LookMode::of_simulation(args.real_time),
+        _ => LookMode::Background,
+    };
     let session_header = found.header.clone();
     let report = Run::new(&rest, session_header, rig, operator.control(), &mut sink)
         .with_settings(settings)
+        .looking(looks.at(&args.session))
         .checked(preflight)
         .resumed(Resume {
             header,

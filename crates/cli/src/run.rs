@@ -6,8 +6,8 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use skinrig_controller::{Preflight, Run, RunReport};
 use skinrig_device::Rig;
 use skinrig_model::{
-    AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, PressVerdict, RunHeader,
-    SimLevel,
+    AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, InterruptionReason, Look,
+    PressVerdict, RunHeader, SimLevel,
 };
 use skinrig_notify::Notifier;
 use skinrig_protocol::{Plan, PlantedFault, Protocol};
@@ -20,6 +20,7 @@ use crate::exit::{Failure, Outcome};
 use crate::fault::FaultInjector;
 use crate::hil::lease;
 use crate::host::host_name;
+use crate::looks::LookMode;
 use crate::notify::{self, RunMessages};
 use crate::paths;
 use crate::progress::ProgressView;
@@ -57,6 +58,8 @@ pub(crate) struct RunInputs<'a> {
     pub known: ReplayExpectations,
     /// Injected faults.
     pub faults: &'a [PlantedFault],
+    /// How the looks of the plan are taken.
+    pub looks: LookMode,
 }
 
 /// Records `plan` on `rig` into a new session in `folder`, after the `preflight`; imports and replays have none, because
@@ -106,7 +109,9 @@ pub(crate) fn record(
     if intent.known.scheduled {
         settings.camera_lag = None;
     }
-    let mut run = Run::new(plan, header, rig, control, &mut sink).with_settings(settings);
+    let mut run = Run::new(plan, header, rig, control, &mut sink)
+        .with_settings(settings)
+        .looking(intent.looks.at(&path));
     if let Some(mut preflight) = preflight {
         preflight.caller_checks.insert(0, gates::recorder(&path));
         run = run.checked(preflight);
@@ -268,6 +273,7 @@ pub(crate) fn simulated(
     let preflight = gates::of_simulated(&rig, &args.sessions, summary.expected_bytes);
     let intent = RunInputs {
         faults: &faults,
+        looks: LookMode::of_simulation(args.real_time),
         ..intent_of(&protocol, seed, summary.duration_s, command_line)
     };
     record(
@@ -355,6 +361,7 @@ pub(crate) fn intent_of<'a>(
         expected: HostDuration::from_secs_f64(duration_s),
         known: ReplayExpectations::default(),
         faults: &[],
+        looks: LookMode::default(),
     }
 }
 
@@ -407,6 +414,7 @@ fn replay(
         expected,
         known: expectations(&reader).map_err(Failure::session)?,
         faults: &[],
+        looks: LookMode::Recorded(decision(&reader).map_err(Failure::session)?),
     };
     let rig = rig::replayed(recording, &header, &document)?;
     record(&intent, &plan, rig, folder, None, None, operator)
@@ -434,7 +442,7 @@ fn expectations(reader: &SessionReader) -> Result<ReplayExpectations, RecorderEr
     let interruptions = reader.interruptions()?;
     let ending = interruptions.last().filter(|i| {
         use InterruptionKind as K;
-        matches!(i.kind, K::Stop | K::Abort | K::Halt)
+        matches!(i.kind, K::Stop | K::Abort | K::Halt) && decided(&i.reason).is_none()
     });
     Ok(ReplayExpectations {
         scheduled: outcomes().any(|o| o.scheduled),
@@ -442,4 +450,17 @@ fn expectations(reader: &SessionReader) -> Result<ReplayExpectations, RecorderEr
         excluded: excluded.collect(),
         interruption: ending.map(|i| (i.t, i.kind)),
     })
+}
+
+/// When which look ended the recorded run, if one did.
+fn decision(reader: &SessionReader) -> Result<Option<(HostTime, Look)>, RecorderError> {
+    let rows = reader.interruptions()?;
+    Ok(rows.iter().find_map(|i| Some((i.t, decided(&i.reason)?))))
+}
+
+fn decided(reason: &InterruptionReason) -> Option<Look> {
+    match reason {
+        InterruptionReason::End(end) => end.decision().copied(),
+        _ => None,
+    }
 }

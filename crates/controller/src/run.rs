@@ -10,6 +10,7 @@ use crate::checks::Preflight;
 use crate::control::ControlHandle;
 use crate::error::Problem;
 use crate::executor::Executor;
+use crate::looks::{Looks, NoLooks};
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 
@@ -78,6 +79,7 @@ pub(crate) struct RunParts<'a> {
     pub(crate) sink: &'a mut dyn RecordSink,
     pub(crate) settings: ControllerSettings,
     pub(crate) preflight: Option<Preflight>,
+    pub(crate) looks: Box<dyn Looks>,
 }
 
 impl Leg {
@@ -122,6 +124,7 @@ impl<'a> Run<'a> {
                 sink,
                 settings: ControllerSettings::default(),
                 preflight: None,
+                looks: Box::new(NoLooks),
             },
         }
     }
@@ -137,6 +140,13 @@ impl<'a> Run<'a> {
     #[must_use]
     pub fn checked(mut self, preflight: Preflight) -> Self {
         self.parts.preflight = Some(preflight);
+        self
+    }
+
+    /// Takes the looks of the plan with `looks`; without them, a plan that declares looks runs to its end.
+    #[must_use]
+    pub fn looking(mut self, looks: Box<dyn Looks>) -> Self {
+        self.parts.looks = looks;
         self
     }
 
@@ -277,6 +287,7 @@ mod tests {
             max_consecutive_invalid: 0,
             surface_check: None,
             suspend: Suspend::default(),
+            stop: None,
             presses: Vec::new(),
             steps: Vec::new(),
         }

@@ -29,6 +29,7 @@ pub mod run_end;
 pub mod scene;
 pub mod settings;
 pub mod skin;
+pub mod stopping;
 pub mod stream;
 pub mod text;
 pub mod time;
@@ -69,6 +70,7 @@ pub use settings::{
     ReductionSettings, RigGeometry, ThresholdGrid, ThresholdRule, WindowAnchor,
 };
 pub use skin::{OUTLINE_SHAPE, SkinOutline};
+pub use stopping::{Look, StopAnswer, StopMetric, StopQuestion};
 pub use stream::{ChunkFacts, LostTime, RawChunk, StreamFormat};
 pub use text::UnknownName;
 pub use time::{HostDuration, HostTime};

@@ -49,6 +49,7 @@ impl Occasion {
     #[must_use]
     pub fn of_end(end: &RunEnd) -> Self {
         match end {
+            end if end.is_complete() => Self::Completed,
             RunEnd::Completed => Self::Completed,
             RunEnd::Stopped(_) => Self::Stop,
             RunEnd::Faulted(causes) => match causes.as_slice().first() {

@@ -151,6 +151,15 @@ impl PressVerdict {
         }
     }
 
+    /// True for a press that was never attempted because the question of the campaign was decided before.
+    #[must_use]
+    pub fn is_unneeded(&self) -> bool {
+        match self {
+            Self::Missed(MissedReason::RunEnded(end)) => end.decision().is_some(),
+            _ => false,
+        }
+    }
+
     /// Verdict on an attempt in leg `leg` of a session that has no recorded outcome: whether the robot
     /// pressed is unknown.
     #[must_use]

@@ -5,9 +5,10 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::fault::{Causes, RunFault};
+use crate::stopping::Look;
 
 /// Why a run stopped without a fault.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
     /// The operator stopped it after a press.
@@ -16,6 +17,8 @@ pub enum StopReason {
     Abort,
     /// The operator switched the motors off: the tip stayed in place.
     Halt,
+    /// A look decided the campaign's question.
+    Decided(Box<Look>),
     /// A session of an older schema, or another program, has only this text.
     Recorded {
         /// The reason.
@@ -23,24 +26,17 @@ pub enum StopReason {
     },
 }
 
-impl StopReason {
-    /// The text for people.
-    #[must_use]
-    pub fn text(&self) -> &str {
-        match self {
-            Self::Stop => "operator: stop",
-            Self::Abort => "operator: abort",
-            Self::Halt => {
-                "operator: halt; the tip stayed where it was: check it before you power the robot again"
-            }
-            Self::Recorded { text } => text,
-        }
-    }
-}
-
 impl fmt::Display for StopReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
+        match self {
+            Self::Stop => f.write_str("operator: stop"),
+            Self::Abort => f.write_str("operator: abort"),
+            Self::Halt => f.write_str(
+                "operator: halt; the tip stayed where it was: check it before you power the robot again",
+            ),
+            Self::Decided(look) => write!(f, "its question is decided: {look}"),
+            Self::Recorded { text } => f.write_str(text),
+        }
     }
 }
 
@@ -50,7 +46,7 @@ impl fmt::Display for StopReason {
 pub enum RunEnd {
     /// Every step of the plan was executed.
     Completed,
-    /// The operator stopped or aborted it.
+    /// The operator, or the answer to its question, stopped it.
     Stopped(StopReason),
     /// A device, a limit or the recorder ended it. The first cause comes first.
     Faulted(Causes<RunFault>),
@@ -83,6 +79,21 @@ impl RunEnd {
             Self::Completed => "completed",
             Self::Stopped(_) => "stopped",
             Self::Faulted(_) => "faulted",
+        }
+    }
+
+    /// True if nothing of the plan is left to do: it was executed, or its question is decided.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.decision().is_some() || matches!(self, Self::Completed)
+    }
+
+    /// The look that decided the campaign's question and so ended the run.
+    #[must_use]
+    pub fn decision(&self) -> Option<&Look> {
+        match self {
+            Self::Stopped(StopReason::Decided(look)) => Some(look),
+            _ => None,
         }
     }
 

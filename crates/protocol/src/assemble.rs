@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::pulse::MAX_MARKED_PRESS;
-use skinrig_model::{PulseTrain, SkinOutline};
+use skinrig_model::{PulseTrain, SkinOutline, StereoGeometry};
 use skinrig_settings::{Collector, Diagnostics, Field, Settings, Span, open};
 
 use crate::file::hex;
@@ -153,8 +153,28 @@ fn assemble(
         None => Some(None),
     });
 
+    let stop = match keys.stop {
+        Some(Some(stop)) => roles
+            .as_deref()
+            .and_then(|roles| stop.declare(roles, root.at("stop"), evaluation, out))
+            .map(Some),
+        Some(None) => Some(None),
+        None => None,
+    };
+
     let (path_kind, locations) = path?;
     let (depths_mm, roles, outline) = (depths_mm?, roles?, outline?);
+    let scene = keys.scene?.scene(outline.centre);
+    let calibrate_at = match keys.calibrate_at? {
+        Some(keys) => {
+            let cameras = scene
+                .cameras
+                .map_or(StereoGeometry::PAPER, |cameras| StereoGeometry { cameras });
+            let field = root.at("calibrate_at");
+            Some(keys.choose(&locations, &roles, &cameras, field, out)?)
+        }
+        None => None,
+    };
     let sync = keys.sync?.map(|keys| sync(&keys, outline, &depths_mm));
     let sync = sync.map_or(Some(None), |sync| sync.map(Some))?;
     let presses = locations.len() as u64 * depths_mm.len() as u64 * roles.len() as u64
@@ -179,12 +199,13 @@ fn assemble(
         operator: keys.operator?,
         prototype: keys.prototype?,
         seed,
-        scene: keys.scene?.scene(outline.centre),
+        scene,
         surroundings: surroundings?,
         sync,
         locations,
         path_kind,
         roles,
+        calibrate_at,
         return_to_start: between.return_to_start,
         pause_between: between.pause,
         shuffle_seed: match keys.order? {
@@ -209,6 +230,7 @@ fn assemble(
         retakes: keys.retakes?,
         surface_check: check??,
         suspend: keys.suspend?,
+        stop: stop?,
         faults: keys.faults?.unwrap_or_default(),
         marks: keys.triggers?.marks,
         surface: keys.press?,

@@ -56,6 +56,9 @@ fn compile(protocol: &Protocol) -> Plan {
     for (index, role) in (0u32..).zip(&protocol.roles) {
         let repetition = RepetitionId::from_index(index);
         let mut visits = visits.clone();
+        if let (Some(at), PressRole::Calibrate) = (&protocol.calibrate_at, role) {
+            visits.retain(|(location, _)| at.binary_search(location).is_ok());
+        }
         if let Some(rng) = &mut shuffle {
             for i in (1..visits.len()).rev() {
                 let j = (u128::from(rng.next_u64()) * (i as u128 + 1)) >> 64;
@@ -90,6 +93,7 @@ fn compile(protocol: &Protocol) -> Plan {
             writer.travel(at);
             writer.press(planned, protocol.motion.period_s.map(|p| p * k as f64));
         }
+        writer.look_after(repetition);
     }
     Plan {
         version: PLAN_VERSION,
@@ -108,6 +112,7 @@ fn compile(protocol: &Protocol) -> Plan {
             ..check
         }),
         suspend: protocol.suspend,
+        stop: protocol.stop.as_ref().map(|stop| stop.rule),
         presses: writer.presses,
         steps: writer.steps,
     }
@@ -157,6 +162,14 @@ impl Writer<'_> {
     fn pause(&mut self, duration: HostDuration) {
         if duration > HostDuration::ZERO {
             self.steps.push(Step::Pause { duration });
+        }
+    }
+
+    /// The declared look after `repetition`, if there is one.
+    fn look_after(&mut self, repetition: RepetitionId) {
+        let declared = self.protocol.stop.iter().flat_map(|stop| &stop.after);
+        if let Some((number, _)) = (1u32..).zip(declared).find(|(_, r)| **r == repetition) {
+            self.steps.push(Step::Look { number, repetition });
         }
     }
 

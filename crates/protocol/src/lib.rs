@@ -15,6 +15,7 @@ pub mod area;
 mod assemble;
 pub mod check;
 mod compile;
+mod design;
 pub mod faults;
 mod file;
 mod findings;
@@ -31,6 +32,7 @@ mod retakes;
 pub mod rig;
 pub mod schedule;
 mod schema;
+pub mod stop;
 pub mod suite;
 pub mod summary;
 pub mod surface;
@@ -41,6 +43,7 @@ pub mod timing;
 
 pub use area::{Area, KeepOut, Surroundings};
 pub use check::{PlanRule, Segment, Violation, check};
+pub use design::best_locations;
 pub use faults::{FaultPhase, FaultTime, InvalidFault, PlantedFault};
 pub use limits::Limits;
 pub use notify::Notify;
@@ -57,6 +60,7 @@ pub use schema::{
     suite_schema_json,
 };
 pub use skinrig_settings::{Diagnostic, Diagnostics, Location};
+pub use stop::{DeclaredStop, Stop};
 pub use suite::Suite;
 pub use summary::PlanSummary;
 pub use surface::{Surface, TouchSearch};

@@ -12,6 +12,7 @@ use skinrig_settings::Choice;
 
 use crate::area::Surroundings;
 use crate::retakes::Retakes;
+use crate::stop::Stop;
 use crate::surface::Surface;
 use crate::surface_check::SurfaceCheck;
 use crate::suspend::Suspend;
@@ -45,6 +46,9 @@ pub struct Plan {
     /// Conditions that suspend the run. Omitted if there are none.
     #[serde(default, skip_serializing_if = "Suspend::is_default")]
     pub suspend: Suspend,
+    /// When the campaign ends by itself; `None`: never before its last step.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stop: Option<Stop>,
     /// Every planned press; `presses[i].id == PressId::from_index(i)`, and the stored `id` is `i`.
     pub presses: Vec<PlannedPress>,
     /// The steps, in order.
@@ -132,6 +136,14 @@ pub enum Step {
     Pause {
         /// How long.
         duration: HostDuration,
+    },
+    /// A look at the data so far, for the rule of [`Plan::stop`]. The run does not wait for it.
+    Look {
+        /// Number of the look, from 1.
+        number: u32,
+        /// The repetition that ended.
+        #[serde(with = "as_index")]
+        repetition: RepetitionId,
     },
 }
 

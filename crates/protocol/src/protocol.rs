@@ -15,6 +15,7 @@ use crate::area::Surroundings;
 use crate::faults::PlantedFault;
 use crate::plan::RunLimits;
 use crate::retakes::Retakes;
+use crate::stop::DeclaredStop;
 use crate::surface::Surface;
 use crate::surface_check::SurfaceCheck;
 use crate::suspend::Suspend;
@@ -55,6 +56,9 @@ pub struct Protocol {
     pub path_kind: &'static str,
     /// Role of each repetition; at least one.
     pub roles: Vec<PressRole>,
+    /// Indices of the locations that calibrating repetitions press, in order; `None`: all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibrate_at: Option<Vec<usize>>,
     /// Whether to return above the first location before the pause between repetitions.
     pub return_to_start: bool,
     /// Pause between repetitions.
@@ -75,6 +79,9 @@ pub struct Protocol {
     pub surface_check: Option<SurfaceCheck>,
     /// Conditions that suspend the run.
     pub suspend: Suspend,
+    /// When the campaign ends by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop: Option<DeclaredStop>,
     /// Injected faults; none in a real protocol.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<PlantedFault>,

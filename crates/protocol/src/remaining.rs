@@ -1,6 +1,6 @@
 //! The remaining plan: the steps for the wanted presses, and nothing else.
 
-use skinrig_model::{HostDuration, Point3, PressHistory, PressId, PressRole, Skin};
+use skinrig_model::{HostDuration, Point3, PressHistory, PressId, PressRole, PressVerdict, Skin};
 
 use crate::plan::{Plan, Step};
 use crate::timing;
@@ -14,9 +14,15 @@ pub enum Route {
     AsPlanned,
 }
 
+/// Whether the run ended because its question was decided: then the presses after it are not missing.
+fn is_decided(histories: &[PressHistory]) -> bool {
+    let mut verdicts = histories.iter().filter_map(|h| h.verdict.as_ref());
+    verdicts.any(PressVerdict::is_unneeded)
+}
+
 impl Plan {
     /// Presses of a resumed run, given their histories: those selected by [`Retakes::should_retake`](crate::Retakes::should_retake), and
-    /// before them all sync presses. Empty if only sync presses are left.
+    /// before them all sync presses. Empty if only sync presses are left, and if the question of the campaign is decided.
     #[must_use]
     pub fn pending(&self, histories: &[PressHistory]) -> Vec<bool> {
         let unknown = PressHistory::default();
@@ -30,7 +36,7 @@ impl Plan {
                 .is_some_and(|p| p.role == PressRole::Sync)
         };
         let n = self.presses.len();
-        let any = (0..n).any(|i| !is_sync(i) && wants(i));
+        let any = !is_decided(histories) && (0..n).any(|i| !is_sync(i) && wants(i));
         (0..n).map(|i| any && (is_sync(i) || wants(i))).collect()
     }
 
@@ -41,9 +47,10 @@ impl Plan {
         let is_pending = |step: &Step| matches!(step, Step::Press(p) if pending(p.press));
         let first = self.steps.iter().position(is_pending);
         let last = self.steps.iter().rposition(is_pending);
+        let looks_from = self.looks_from(&pending);
         let mut steps = Vec::new();
         if let (Some(first), Some(last)) = (first, last) {
-            for (n, step) in self.steps.iter().enumerate().take(last + 1) {
+            for (n, step) in self.steps.iter().enumerate().take(self.end_after(last)) {
                 // Whether a wanted press follows before the next step of the same kind.
                 let leads = |same: fn(&Step) -> bool| {
                     let rest = self.steps.iter().skip(n + 1);
@@ -56,6 +63,7 @@ impl Plan {
                         route == Route::AsPlanned || leads(|s| matches!(s, Step::Travel { .. }))
                     }
                     Step::Press(p) => pending(p.press),
+                    Step::Look { .. } => n > looks_from,
                 };
                 if is_kept {
                     steps.push(step.clone());
@@ -69,6 +77,27 @@ impl Plan {
         self.close_gaps(&mut rest, pending);
         rest.allow_time();
         rest
+    }
+
+    /// The step before the looks of a further leg: those after its first press, and the last one before, which the earlier leg
+    /// may not have lived to take. Sync presses do not count.
+    fn looks_from(&self, pending: impl Fn(PressId) -> bool) -> usize {
+        let is_sync = |id: PressId| {
+            let press = self.presses.get(id.index() as usize);
+            press.is_some_and(|p| p.role == PressRole::Sync)
+        };
+        let is_first =
+            |s: &Step| matches!(s, Step::Press(p) if pending(p.press) && !is_sync(p.press));
+        let first = self.steps.iter().position(is_first).unwrap_or(0);
+        let mut before = self.steps.iter().take(first);
+        let last = before.rposition(|s| matches!(s, Step::Look { .. }));
+        last.map_or(first, |n| n.saturating_sub(1))
+    }
+
+    /// Number of steps up to step `last`, with the look that follows it.
+    fn end_after(&self, last: usize) -> usize {
+        let follows = matches!(self.steps.get(last + 1), Some(Step::Look { .. }));
+        last + 1 + usize::from(follows)
     }
 
     /// Moves presses forward by the slots of the omitted presses before them.
@@ -94,7 +123,7 @@ impl Plan {
                         *earlier = omitted;
                     }
                 }
-                Step::Travel { .. } | Step::Pause { .. } => {}
+                Step::Travel { .. } | Step::Pause { .. } | Step::Look { .. } => {}
             }
         }
         for step in &mut rest.steps {
@@ -129,7 +158,7 @@ impl Plan {
                     position = Some(*to);
                 }
                 Step::Press(p) => position = Some(p.at.at_height(limits.clearance_mm)),
-                Step::Begin { .. } | Step::Pause { .. } => {}
+                Step::Begin { .. } | Step::Pause { .. } | Step::Look { .. } => {}
             }
         }
     }

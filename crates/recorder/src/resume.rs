@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use skinrig_model::{
-    PressFaultKind, PressRole, PressVerdict, ResumeHeader, RunEnd, StreamFormat, UnknownName,
+    PressFaultKind, PressRole, PressVerdict, ResumeHeader, StreamFormat, UnknownName,
 };
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection, Sqlite, Transaction};
@@ -39,8 +39,10 @@ pub(crate) fn lock_unfinished<S: ChunkScanner>(path: &Path) -> Result<WriterLock
 
 /// Whether a session is complete, and no press can be repeated by a rig.
 fn is_completed(reader: &SessionReader) -> Result<bool, RecorderError> {
-    if !matches!(reader.end()?, Some((_, RunEnd::Completed))) {
-        return Ok(false);
+    match reader.end()? {
+        Some((_, end)) if end.decision().is_some() => return Ok(true),
+        Some((_, end)) if end.is_complete() => {}
+        _ => return Ok(false),
     }
     if !reader.header()?.is_of_a_rig() {
         return Ok(true);

@@ -6,7 +6,7 @@ use std::thread::ScopedJoinHandle;
 use sha2::{Digest, Sha256};
 use skinrig_model::{
     BoxReport, BoxTime, CameraId, ChunkFacts, HostTime, PlannedPress, PressId, PressVerdict,
-    RunEnd, RunHeader, StreamFormat, TriggerEdge, press::PressRole,
+    RunHeader, StreamFormat, TriggerEdge, press::PressRole,
 };
 
 mod chain;
@@ -180,7 +180,7 @@ fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[St
     if let Some(devices) = report.ok_or_add(reader.devices())
         && devices.is_empty()
         && header.rig_kind != "imported"
-        && matches!(reader.end(), Ok(Some((_, RunEnd::Completed))))
+        && matches!(reader.end(), Ok(Some((_, end))) if end.is_complete())
     {
         report.mismatch("device", "the devices of a completed run", "none");
     }

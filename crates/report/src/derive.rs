@@ -186,6 +186,31 @@ pub fn disagreement(analysis: &Analysis) -> Option<String> {
     })
 }
 
+/// The RMSE of a campaign that ends by itself: its value, the level of its interval in percent, and the interval at that level.
+pub(crate) struct RmseAtLook {
+    pub value: String,
+    pub level: String,
+    pub interval: String,
+    /// Presses behind it, and the look.
+    pub extent: String,
+}
+
+/// `None` for other sessions: their RMSE has a 95 % interval.
+#[must_use]
+pub(crate) fn rmse_at_look(analysis: &Analysis) -> Option<RmseAtLook> {
+    let look = analysis.campaign.as_ref()?.of_rmse()?;
+    let end = |mm: Option<f64>| mm.map_or_else(|| "open".to_owned(), |mm| number(Some(mm), 2));
+    Some(RmseAtLook {
+        value: number(Some(look.value_mm), 2),
+        level: number(Some(look.level_percent()), 1),
+        interval: format!("[{}, {}]", end(look.low_mm), end(look.high_mm)),
+        extent: format!(
+            "n {} presses at look {} of {}",
+            look.presses, look.number, look.declared
+        ),
+    })
+}
+
 /// A note if the geometry differs from the one in the settings: nominal, or a smaller model. `None` without presses.
 #[must_use]
 pub(crate) fn geometry_note(analysis: &Analysis) -> Option<String> {

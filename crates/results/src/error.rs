@@ -54,6 +54,17 @@ pub enum ResultsError {
         /// Why not.
         why: EarlierMismatch,
     },
+    /// A plan that declares looks cannot be read.
+    #[error("cannot read the plan in the session: {0}")]
+    Plan(serde_json::Error),
+    /// A look at a campaign found nothing that may be used.
+    #[error("no look {number}: {why}")]
+    NoLook {
+        /// Number of the look.
+        number: u32,
+        /// Why not.
+        why: String,
+    },
     /// The analysis rejects its input.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),

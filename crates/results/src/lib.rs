@@ -7,8 +7,9 @@
 //! 4. [`AlignedSession::analyze`]: runs the complete analysis, with the robot's path and, on request, the public code's
 //!    results.
 //!
-//! [`analyze`] runs all four. The command line parses its arguments, calls this crate and prints.
+//! [`analyze`] runs all four. [`take_look`] looks at a campaign that is under way. The command line parses its arguments, calls this crate and prints.
 
+mod campaign;
 mod contacts;
 mod earlier;
 mod earlier_mismatch;
@@ -19,6 +20,7 @@ mod rig_document;
 mod session;
 mod settings;
 mod stages;
+mod take_look;
 mod window;
 
 pub use earlier_mismatch::EarlierMismatch;
@@ -29,4 +31,5 @@ pub use rig_document::RigDocument;
 pub use session::Session;
 pub use settings::AnalysisOptions;
 pub use stages::{AlignedSession, AnalyzedSession, RecordedSession, analyze};
+pub use take_look::take_look;
 pub use window::{ChunkIndex, events_between};

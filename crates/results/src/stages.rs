@@ -4,13 +4,14 @@ use std::path::Path;
 
 use skinrig_analysis::motion::MotionCourse;
 use skinrig_analysis::reference_code::reference_code;
-use skinrig_analysis::result::{Motion, PressResult};
+use skinrig_analysis::result::{Motion, PressResult, Warning, WarningCause};
 use skinrig_analysis::{
     Analysis, LegStart, Retention, SessionInput, analyze_recalibrated, analyze_with_events, legs,
 };
 use skinrig_model::HostTime;
 use skinrig_recorder::{RecorderError, SessionReader};
 
+use crate::campaign;
 use crate::earlier;
 use crate::error::ResultsError;
 use crate::events::SessionEvents;
@@ -89,14 +90,24 @@ impl AlignedSession {
         };
         let earlier = self.session.calibration_from.as_deref();
         let earlier = earlier.map(|path| earlier::calibration(&self.session, path));
-        let (analysis, kept) = match earlier.transpose()? {
+        let (mut analysis, kept) = match earlier.transpose()? {
             None => analyze_with_events(&self.input, &self.events, keep)?,
             Some(earlier) => analyze_recalibrated(&self.input, &self.events, keep, &earlier)?,
         };
         let reference = wants_reference.then(|| reference_code(&self.input, &analysis, &kept));
         let motion = motion(&self.session.reader, &analysis)?;
+        let end = self.session.reader.end()?.map(|(_, end)| end);
+        let plan_json = &self.session.header.plan_json;
+        let campaign = campaign::looks(&analysis, plan_json, end.as_ref())?;
+        analysis.warnings.extend(campaign.as_ref().map(|found| {
+            Warning::from(WarningCause::SequentialLooks {
+                looks: found.looks.len(),
+                declared: found.declared,
+            })
+        }));
         Ok(AnalyzedSession {
             analysis: Analysis {
+                campaign,
                 reference,
                 motion,
                 ..analysis

@@ -42,6 +42,7 @@ mod scores;
 pub mod seeded;
 mod spending;
 mod spread;
+mod stopping;
 
 pub use compare::{compare, estimate};
 pub use comparison::{
@@ -53,3 +54,4 @@ pub use family::{AdjustedComparison, Pair, PairSelection, compare_all};
 pub use question::{ComparisonTarget, ImprovementDirection, Pairing, Settings};
 pub use sample::{Count, Kind, Position, Sample, SampleFault};
 pub use spending::{AlphaSpending, MOST_LOOKS, Outlook};
+pub use stopping::{LookEstimate, StoppingRule, stop_sample};

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod design;
 mod regions;
 mod remount;
 mod skins;

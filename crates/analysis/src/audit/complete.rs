@@ -128,8 +128,11 @@ fn missed(input: &SessionInput) -> Option<Finding> {
     let rows = rows.filter(|(p, _)| p.role != PressRole::Sync);
     let (mut planned, mut missed) = (0u32, 0u32);
     for (_, outcome) in rows {
-        planned += 1;
         let verdict = outcome.as_ref().map(|o| &o.verdict);
+        if verdict.is_some_and(PressVerdict::is_unneeded) {
+            continue;
+        }
+        planned += 1;
         missed += u32::from(matches!(verdict, None | Some(PressVerdict::Missed(_))));
     }
     (planned == 0 || f64::from(missed) > MAX_MISSED * f64::from(planned)).then(|| {

@@ -3,6 +3,7 @@
 mod alignment;
 mod audit;
 mod calibration;
+mod campaign;
 mod clock_map;
 mod coverage;
 mod evidence;
@@ -30,6 +31,7 @@ pub use alignment::{
 };
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ModelTest, ThresholdChoice};
+pub use campaign::CampaignLooks;
 pub use clock_map::{ClockMap, MapName};
 pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
 pub use evidence::Evidence;
@@ -153,6 +155,9 @@ pub struct Analysis {
     /// Event rates around a few scored presses.
     #[serde(default)]
     pub zooms: Vec<RateZoom>,
+    /// Looks of a campaign that ends by itself; `None` if the plan declares none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub campaign: Option<CampaignLooks>,
     /// How the robot followed its commands; `None` without poses ([`crate::motion`]).
     #[serde(default)]
     pub motion: Option<Motion>,

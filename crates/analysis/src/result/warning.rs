@@ -210,6 +210,16 @@ pub enum WarningCause {
     /// No metrics.
     #[error("no scored press was attempted, so there are no metrics")]
     NoScoredPress,
+    /// The data decided when to stop.
+    #[error(
+        "the looks decided when to end: 95 % intervals do not allow for that, those of the looks do ({looks} of {declared} taken)"
+    )]
+    SequentialLooks {
+        /// Looks taken.
+        looks: usize,
+        /// Looks declared.
+        declared: u32,
+    },
     /// Times and positions that nobody measured.
     #[error("press times and positions come from a schedule, not from a measurement")]
     Scheduled,

@@ -249,3 +249,14 @@ pub(crate) struct ViewArgs {
     #[arg(long)]
     pub control: bool,
 }
+
+/// Arguments of `take-look`.
+#[derive(Debug, Args)]
+pub(crate) struct TakeLookArgs {
+    /// The session.
+    pub session: PathBuf,
+
+    /// Number of the look, from 1.
+    #[arg(long, value_name = "N")]
+    pub number: u32,
+}

@@ -14,7 +14,7 @@ use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::bench::{
     ControlArgs, DetectArgs, DevicesArgs, JogArgs, NoteArgs, PlanArgs, ResumeArgs, RunArgs,
-    StatusArgs, ViewArgs, WatchArgs,
+    StatusArgs, TakeLookArgs, ViewArgs, WatchArgs,
 };
 pub(crate) use self::challenge::{
     ChallengeArgs, ChallengeCommand, ExamineArgs, MakeArgs, ScoreArgs,
@@ -267,6 +267,10 @@ pub(crate) enum Command {
     /// Write a manual page for each command.
     #[command(after_help = "Example:\n  skinrig man ~/.local/share/man/man1 && man skinrig-run")]
     Man(ManArgs),
+
+    /// Look at the data of a campaign that is under way.
+    #[command(hide = true)]
+    TakeLook(TakeLookArgs),
 
     /// Brake the robot's arm if the program that started this one dies.
     #[command(hide = true)]

@@ -39,8 +39,10 @@ pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Pr
     )
     .map_err(|f| problem(EvidenceKind::Disk, "computer", &f))?;
     let mut findings = Findings::default();
-    if let RunEnd::Stopped(why) = &report.end {
-        findings.add_evidence(EvidenceKind::TimeOut, "robot", why.text());
+    if let RunEnd::Stopped(why) = &report.end
+        && !report.end.is_complete()
+    {
+        findings.add_evidence(EvidenceKind::TimeOut, "robot", why.to_string());
     }
     findings.evidence.extend(run_evidence::from_report(&report));
     let mut golden = GoldenRun {

@@ -29,6 +29,7 @@ use skinrig_sim::SimClock;
 use crate::args::ImportArgs;
 use crate::conclusion::conclude;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::looks::LookMode;
 use crate::run::{RunInputs, record};
 use crate::signals::Operator;
 use crate::sink::ReplayExpectations;
@@ -117,6 +118,7 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
         expected: HostDuration(last),
         known,
         faults: &[],
+        looks: LookMode::default(),
     };
     let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = record(&intent, &plan, rig, &args.sessions, None, None, &operator)?;

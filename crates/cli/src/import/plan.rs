@@ -69,6 +69,7 @@ pub(super) fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[
         max_consecutive_invalid: 0,
         surface_check: None,
         suspend: Suspend::default(),
+        stop: None,
         presses,
         steps,
     }

@@ -48,7 +48,7 @@ fn state(status: &Status) -> String {
 fn next_step(status: &Status) -> Option<String> {
     let stored = status.stored.as_ref();
     let end = stored.and_then(|s| s.end.0.as_ref());
-    let completed = stored.is_some_and(|s| s.sealed) && matches!(end, Some(RunEnd::Completed));
+    let completed = stored.is_some_and(|s| s.sealed) && end.is_some_and(RunEnd::is_complete);
     if status.live.is_some() || status.writer.is_some() || completed {
         return None;
     }

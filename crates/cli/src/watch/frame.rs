@@ -261,7 +261,18 @@ fn state(
     sealed: bool,
 ) -> String {
     match (live, writer, end) {
-        _ if sealed => end.map_or("sealed", RunEnd::name).to_owned(),
+        _ if sealed => match end {
+            Some(end) => match end.decision() {
+                Some(look) => format!(
+                    "{}: question decided at look {} of {}",
+                    end.name(),
+                    look.number,
+                    look.declared
+                ),
+                None => end.name().to_owned(),
+            },
+            None => "sealed".to_owned(),
+        },
         (Some(live), ..) => live.state.clone(),
         (None, Some(by), None) => format!("written by {by}, which does not respond"),
         (None, Some(_), Some(end)) => format!("{}, being sealed", end.name()),

@@ -46,6 +46,7 @@ mod sample_size;
 mod servers;
 mod special;
 mod starter;
+mod stopping;
 mod strangers;
 mod streams;
 mod support;

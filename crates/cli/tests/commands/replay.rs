@@ -9,7 +9,8 @@ use crate::support::{Lab, chunks, only, read_json, show, skinrig, text};
 pub(crate) fn assert_replays(lab: &Lab, session: &Path, folder: &str) {
     skinrig(&["analyze", &text(session)]).code(0);
     let original = read_json(&session_results(session));
-    let stopped = show(session)["end"] == "stopped";
+    let shown = show(session);
+    let stopped = shown["end"] == "stopped" && shown["end_cause"]["decided"].is_null();
     skinrig(&[
         "run",
         "--replay",

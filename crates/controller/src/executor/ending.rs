@@ -51,7 +51,7 @@ impl Executor<'_> {
         let (mut end, interruption) = match result {
             Ok(()) => (RunEnd::Completed, None),
             // The interruption was recorded when the operator requested it.
-            Err(Halt::Stopped) => (RunEnd::Stopped(StopReason::Stop), None),
+            Err(Halt::Stopped) => (RunEnd::Stopped(self.stop_reason()), None),
             Err(Halt::Aborted) => {
                 self.machine.fire(Event::Abort);
                 (

@@ -2,10 +2,11 @@
 //!
 //! Each part owns its state and is private to this module. Each stage of a run adds its methods in its own file: `arming`
 //! (power on), `stream_checks` (preflight), `steps`, `press`, `press_data` and `search` (the plan), `surface` (surface
-//! checks), `requests` (the operator), `suspension` (waiting), and `ending` (return to rest).
+//! checks), `look` (a campaign's question), `requests` (the operator), `suspension` (waiting), and `ending` (return to rest).
 
 mod arming;
 mod ending;
+mod look;
 mod press;
 mod press_data;
 mod requests;
@@ -17,7 +18,7 @@ mod suspension;
 
 use skinrig_device::{Clock, DeviceError, Rig};
 use skinrig_model::{
-    CameraId, HostDuration, HostTime, MotionCommand, Point3, Record, RunFault, Skin,
+    CameraId, HostDuration, HostTime, Look, MotionCommand, Point3, Record, RunFault, Skin,
 };
 use skinrig_protocol::plan::Plan;
 
@@ -25,6 +26,7 @@ use crate::camera_streams::{CameraStreams, ReadMode};
 use crate::error::Halt;
 use crate::guard::GuardedIndenter;
 use crate::journal::Journal;
+use crate::looks::Looks;
 use crate::machine::Machine;
 use crate::pose_trackers::PoseTrackers;
 use crate::preflight_run::PreflightRun;
@@ -49,6 +51,11 @@ pub(crate) struct Executor<'a> {
     series: PressSeries,
     preflight: PreflightRun,
     suspender: Suspender,
+    looks: Box<dyn Looks>,
+    /// The first look with an answer.
+    answered: Option<Look>,
+    /// The look that stops the run.
+    decided: Option<Look>,
 }
 
 impl<'a> Executor<'a> {
@@ -60,6 +67,7 @@ impl<'a> Executor<'a> {
             sink,
             settings,
             preflight,
+            looks,
         } = parts;
         let Rig {
             indenter,
@@ -84,6 +92,9 @@ impl<'a> Executor<'a> {
             trackers: PoseTrackers::default(),
             preflight: PreflightRun::new(preflight),
             suspender: Suspender::new(plan.suspend),
+            looks,
+            answered: None,
+            decided: None,
         }
     }
 
@@ -131,6 +142,7 @@ impl<'a> Executor<'a> {
         self.clock.wait_until(until);
         self.observe()?;
         self.suspend()?;
+        self.take_looks()?;
         self.handle_requests()
     }
 

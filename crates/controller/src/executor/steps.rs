@@ -33,6 +33,7 @@ impl Executor<'_> {
                     speed_mm_s,
                     deadline,
                 } => self.go(&format!("travel (step {n})"), *to, *speed_mm_s, *deadline)?,
+                Step::Look { number, .. } => self.begin_look(*number)?,
                 Step::Press(press) => {
                     self.press(press)?;
                     self.check_surface_after(n)?;

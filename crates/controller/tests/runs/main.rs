@@ -8,6 +8,7 @@ mod edges;
 mod escape;
 mod guard;
 mod jog;
+mod looks;
 mod mock;
 mod preflight;
 mod progress;

@@ -10,9 +10,11 @@ use super::motion::{LimitKeys, MotionKeys, Triggers};
 use super::path::{Order, Path, Repetitions};
 use super::ranges::{DEPTH_MM, VERSION};
 use super::scene::SceneKeys;
+use crate::design::CalibrateAt;
 use crate::faults::{self, PlantedFault};
 use crate::protocol::Prototype;
 use crate::retakes::Retakes;
+use crate::stop::StopKeys;
 use crate::surface::Surface;
 use crate::surface_check::SurfaceCheck;
 use crate::suspend::Suspend;
@@ -78,6 +80,10 @@ pub(crate) struct ProtocolKeys {
     pub triggers: Triggers,
     /// Which repetitions calibrate the camera geometry and which are scored. Presses that calibrate never score.
     pub evaluation: Evaluation,
+    /// Which locations of the path calibrating repetitions press; all when absent.
+    pub calibrate_at: Option<CalibrateAt>,
+    /// When the campaign ends by itself, before all its repetitions; never when absent.
+    pub stop: Option<StopKeys>,
     /// Settings of the analysis that follows the run.
     #[setting(default)]
     pub analysis: AnalysisSettings,

@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod common;
+mod design;
 mod errors;
 mod laws;
 mod limits;
@@ -11,6 +12,7 @@ mod remaining;
 mod rig;
 mod schedules;
 mod shipped;
+mod stop;
 mod suite;
 mod surface_check;
 mod validate;

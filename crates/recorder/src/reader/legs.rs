@@ -55,7 +55,7 @@ impl SessionReader {
         let ends = self.legs()?.into_iter().map(|leg| leg.end);
         let plan_done = ends
             .into_iter()
-            .any(|end| matches!(end, Some((_, RunEnd::Completed))));
+            .any(|end| end.is_some_and(|(_, end)| end.is_complete()));
         let known = |attempts: Vec<crate::rows::AttemptRow>| {
             let last = attempts.last()?;
             let verdict = last.outcome.as_ref().map(|o| o.verdict.clone());

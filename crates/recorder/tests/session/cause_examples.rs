@@ -419,10 +419,28 @@ pub(crate) fn verdicts() -> Vec<PressVerdict> {
     ]
 }
 
+/// The end of a campaign whose question is decided.
+pub(crate) fn decided() -> RunEnd {
+    RunEnd::Stopped(StopReason::Decided(Box::new(Look {
+        number: 2,
+        declared: 7,
+        repetition: RepetitionId::from_index(2),
+        presses: 162,
+        metric: StopMetric::Median,
+        question: StopQuestion::NarrowerThan(0.3),
+        alpha: 0.05 / 7.0,
+        value_mm: 0.1 + 0.2,
+        low_mm: Some(1.0 / 3.0),
+        high_mm: None,
+        answer: Some(StopAnswer::Narrow),
+    })))
+}
+
 pub(crate) fn missed() -> Vec<MissedReason> {
     vec![
         MissedReason::RunEnded(ended_run()),
         MissedReason::RunEnded(RunEnd::Stopped(StopReason::Abort)),
+        MissedReason::RunEnded(decided()),
         MissedReason::NeverAttempted,
         MissedReason::Recorded {
             text: "of an older session".to_owned(),
@@ -447,5 +465,6 @@ pub(crate) fn interruptions() -> Vec<(InterruptionKind, InterruptionReason)> {
                 text: "of an older session".to_owned(),
             },
         ),
+        (K::Stop, R::End(decided())),
     ]
 }

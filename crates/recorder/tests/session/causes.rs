@@ -1,10 +1,10 @@
 //! Causes as types: every kind reads back from the session file, whatever its text; sessions with text alone are still read.
 
 use skinrig_model::*;
-use skinrig_recorder::{SessionReader, SessionWriter, verify};
+use skinrig_recorder::{RecorderError, SessionReader, SessionWriter, verify};
 
 use crate::cause_examples::{
-    SERIAL, check_examples, ended_run, interruptions, missed, trips, verdicts,
+    SERIAL, check_examples, decided, ended_run, interruptions, missed, trips, verdicts,
 };
 use crate::common::{Evt2, change, further_leg, header, outcome};
 
@@ -66,6 +66,18 @@ fn check_causes(path: &std::path::Path, end: &RunEnd) {
         reader.end().unwrap().map(|(_, end)| end).as_ref(),
         Some(end)
     );
+}
+
+#[test]
+fn a_decided_campaign_reads_back_and_takes_no_further_leg() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("decided.session.sqlite");
+    write(&path, decided(), true);
+    check_causes(&path, &decided());
+    assert!(matches!(
+        SessionWriter::resume::<Evt2>(&path),
+        Err(RecorderError::AlreadyCompleted { .. })
+    ));
 }
 
 /// Through the file, and on as the end of an earlier leg. Their text plays no part: other words in the columns for people

@@ -18,6 +18,7 @@ mod results;
 mod session;
 
 use skinrig_analysis::result::Analysis;
+use skinrig_model::RunEnd;
 
 use self::cells::missing;
 use crate::document::{Banner, Block, Document, Group, Note, Section, Table, Text};
@@ -51,7 +52,8 @@ pub(crate) fn render(input: &ReportInput<'_>) -> String {
     let word = p.stand_in();
     let suffix = |what: &str| word.map_or_else(String::new, |word| format!(" ({word}{what})"));
     let run_end = or_missing(&p.run_end);
-    let tone = if p.run_end == "completed" {
+    let decided = p.run_end_cause.as_ref().and_then(RunEnd::decision);
+    let tone = if p.run_end == "completed" || decided.is_some() {
         "ok"
     } else {
         "bad"

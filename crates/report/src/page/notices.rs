@@ -1,5 +1,7 @@
 //! Owns the remarks about a session: losses, warnings, legs, interruptions, notes.
 
+use skinrig_model::RunEnd;
+
 use crate::document::{Group, Note, Text};
 use crate::format::{grouped, number};
 use crate::input::ReportInput;
@@ -71,7 +73,9 @@ fn troubles(input: &ReportInput<'_>) -> Vec<Note> {
         let ending = p.interruptions.iter().find(|i| i.ended_run);
         let at = ending.map_or_else(String::new, |i| format!(" at {} s", number(Some(i.t_s), 1)));
         let end = crate::format::or_missing(&p.run_end);
-        notes.push(Note::new(format!("Run {end}{at}."), &**why).bad());
+        let note = Note::new(format!("Run {end}{at}."), &**why);
+        let decided = p.run_end_cause.as_ref().and_then(RunEnd::decision);
+        notes.push(if decided.is_some() { note } else { note.bad() });
     }
     for (i, bytes) in p.lost_bytes.iter().enumerate().filter(|(_, b)| **b > 0) {
         let mut text = format!("Camera {}: {} bytes", i + 1, grouped(*bytes));

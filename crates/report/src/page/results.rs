@@ -83,6 +83,13 @@ fn hero(a: &Analysis, rmse: &MetricRow) -> Group {
             .add(".")
     } else if rmse.n == 0 {
         "No scored press counts, so there is no error.".into()
+    } else if let Some(at) = derive::rmse_at_look(a) {
+        Text::from(format!(
+            "{} mm, {} % interval {} mm",
+            at.value, at.level, at.interval
+        ))
+        .dot()
+        .add(at.extent)
     } else {
         Text::from(format!("95 % interval {} mm", rmse.interval))
             .dot()

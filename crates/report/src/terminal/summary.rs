@@ -56,11 +56,19 @@ fn head(input: &ReportInput<'_>) -> Vec<Note> {
     } else {
         let locator = derive::locator(a);
         let locator = locator.map_or_else(String::new, |l| format!(", locator {}", l.name()));
-        let (value, interval) = (number(rmse.value, 2), interval(rmse, 1.0, 2));
-        let text = format!(
-            "{value} mm, 95 % interval {interval}, n {} presses{locator}",
-            rmse.n
-        );
+        let text = match derive::rmse_at_look(a) {
+            Some(at) => format!(
+                "{} mm, {} % interval {}, {}{locator}",
+                at.value, at.level, at.interval, at.extent
+            ),
+            None => {
+                let (value, interval) = (number(rmse.value, 2), interval(rmse, 1.0, 2));
+                format!(
+                    "{value} mm, 95 % interval {interval}, n {} presses{locator}",
+                    rmse.n
+                )
+            }
+        };
         Note::new("RMSE", text).tone(Tone::Answer)
     });
     if a.is_valid() {

@@ -8,3 +8,4 @@ mod populations;
 mod power;
 mod refusals;
 mod sequential;
+mod stopping;

@@ -53,6 +53,7 @@ pub(crate) fn plan() -> Plan {
         max_consecutive_invalid: 0,
         surface_check: None,
         suspend: Suspend::default(),
+        stop: None,
         presses,
         steps,
     }

@@ -208,6 +208,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         reduction: Some(studies::reduction()),
         latency: Some(latency),
         reference: None,
+        campaign: None,
         findings: vec![],
         activity,
         off_sensor: [OffSensor::default(); 2],
