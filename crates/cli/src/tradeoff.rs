@@ -295,17 +295,19 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         if args.check > 0 {
             outln!("{}\n", check_in_words(result));
         }
-        let table = terminal_table(
-            result,
-            if output.verbose {
+        if recommendations.is_empty() || output.verbose {
+            let rows = if output.verbose {
                 Rows::All
             } else {
                 Rows::Front
-            },
-            &rig,
-            crate::terminal::is_coloured(&std::io::stdout()),
-        );
-        crate::terminal::out(format_args!("{table}"));
+            };
+            let color = crate::terminal::is_coloured(&std::io::stdout());
+            let table = terminal_table(result, rows, &rig, color);
+            crate::terminal::out(format_args!("{table}"));
+        } else {
+            let (tried, of) = (result.rows.len(), result.predictions.combinations);
+            outln!("{rig}\n{tried} of {of} choices tried; the page and -v have the table");
+        }
         outln!("\npage     {}", html_path.display());
         outln!("results  {}", json_path.display());
     }

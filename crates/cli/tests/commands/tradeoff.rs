@@ -100,6 +100,7 @@ fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
         "1",
         "--target-rmse",
         "1 um",
+        "-v",
     ])
     .code(4)
     .expect_stderr(&["--full"]);
@@ -114,6 +115,10 @@ fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
     assert!(answer < output.out.find("choices tried on").unwrap());
     let budget = ["tradeoff", &session, "--repeats", "1", "--budget", "10s"];
     let met = skinrig(&budget).code(0).out;
+    assert!(
+        met.lines().count() <= 20 && !met.contains("choices tried on"),
+        "{met}"
+    );
     let mut lines = met.lines();
     assert!(
         lines.next().unwrap().starts_with("most accurate within"),
