@@ -31,6 +31,21 @@ fn thread_cpu_s() -> f64 {
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }
 
+/// The machine whose CPU times the results have. Its processor is `null` where the system does not name it.
+fn machine() -> serde_json::Value {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = text.lines().find_map(|line| {
+        let (key, value) = line.split_once(':')?;
+        (key.trim() == "model name").then(|| value.trim().to_owned())
+    });
+    let threads = std::thread::available_parallelism().ok();
+    serde_json::json!({
+        "processor": name,
+        "architecture": std::env::consts::ARCH,
+        "threads": threads.map(std::num::NonZero::get),
+    })
+}
+
 impl From<CostKind> for Cost {
     fn from(kind: CostKind) -> Self {
         match kind {
@@ -258,7 +273,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     })?;
     let recommendations = recommendations(&measured, args);
     let result = &measured.tradeoff;
-    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "variant": variant, "tradeoff": result });
+    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "variant": variant, "machine": machine(), "tradeoff": result });
     let found = recommendations.iter().map(|a| {
         let found = a.found.as_ref().ok();
         let row = found.map(|f| f.row);

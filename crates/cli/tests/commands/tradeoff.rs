@@ -85,6 +85,9 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
     }
     assert!(output["answers"][0]["row"]["cpu_us"].as_f64().unwrap() > 0.0);
     assert_eq!(output["answers"][0]["confirmed_mm"]["n"], 6);
+    let machine = &output["machine"];
+    assert_eq!(machine["architecture"], std::env::consts::ARCH);
+    assert!(machine["threads"].as_u64() >= Some(1), "{machine}");
     let page = std::fs::read_to_string(output["files"]["page"].as_str().unwrap()).unwrap();
     assert!(page.contains("<svg") && page.contains("</html>"), "{page}");
 }
