@@ -48,6 +48,11 @@ impl Phase {
         self.0.set_position(u64::from(finished));
     }
 
+    /// Replaces the text.
+    pub(crate) fn say(&self, text: String) {
+        self.0.set_message(text);
+    }
+
     fn draw(text: &str, template: &str, keys: impl FnOnce(ProgressStyle) -> ProgressStyle) -> Self {
         let bar = ProgressBar::new_spinner();
         // The templates are constants; should one ever be wrong, the default style still shows the phase.

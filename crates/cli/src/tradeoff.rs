@@ -1,9 +1,14 @@
 //! `skinrig tradeoff`: the trade-off between speed and accuracy, measured on a session.
 
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use rustix::time::{ClockId, clock_gettime};
 use skinrig_analysis::AnalysisError;
 use skinrig_analysis::tradeoff::{
-    Cost, Measured, Plan, Requirement, Selection, Unselected, measure,
+    Cost, Measured, Plan, Predicted, Prediction, Predictions, Progress, Requirement, Row,
+    Selection, Tradeoff, Unselected, measure,
 };
 use skinrig_model::RunHeader;
 use skinrig_report::tradeoff::{Rows, label, page, protocol_lines, terminal_table};
@@ -16,6 +21,7 @@ use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
 use crate::results::{not_official, open, write};
+use crate::signals::on_ctrl_c;
 use crate::terminal::Output;
 use crate::tradeoff_file::FORMAT;
 
@@ -23,6 +29,21 @@ use crate::tradeoff_file::FORMAT;
 fn thread_cpu_s() -> f64 {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+}
+
+/// The machine whose CPU times the results have. Its processor is `null` where the system does not name it.
+fn machine() -> serde_json::Value {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = text.lines().find_map(|line| {
+        let (key, value) = line.split_once(':')?;
+        (key.trim() == "model name").then(|| value.trim().to_owned())
+    });
+    let threads = std::thread::available_parallelism().ok();
+    serde_json::json!({
+        "processor": name,
+        "architecture": std::env::consts::ARCH,
+        "threads": threads.map(std::num::NonZero::get),
+    })
 }
 
 impl From<CostKind> for Cost {
@@ -78,10 +99,14 @@ fn refusal(unselected: &Unselected) -> String {
 }
 
 /// Prints a recommendation with its requirement and the lines of the protocol that select it. `own` lists the changes of a variant.
-fn print_recommendation(recommendation: &Recommendation<'_>, own: Option<&str>) {
+fn print_recommendation(
+    recommendation: &Recommendation<'_>,
+    own: Option<&str>,
+    predictions: &Predictions,
+) {
     outln!("{}:", recommendation.question);
-    let (row, rmse) = match &recommendation.found {
-        Ok(found) => (found.row, &found.confirmed_mm),
+    let (row, rmse, prediction) = match &recommendation.found {
+        Ok(found) => (found.row, &found.confirmed_mm, predictions.get(found.index)),
         Err(unselected) => {
             outln!("  {}\n", refusal(unselected));
             return;
@@ -95,13 +120,17 @@ fn print_recommendation(recommendation: &Recommendation<'_>, own: Option<&str>) 
     let paint = Paint::new(crate::terminal::is_coloured(&std::io::stdout()));
     let chosen = format!("{name}: RMSE {} mm", bound(rmse.value));
     outln!(
-        "  {}, 95 % interval [{}, {}], n {} that did not choose;\n  {:.3} ms of CPU time per press\n",
+        "  {}, 95 % interval [{}, {}], n {} that did not choose;\n  {:.3} ms of CPU time per press",
         paint.bold(&chosen),
         bound(rmse.low),
         bound(rmse.high),
         rmse.n,
         row.cpu_us * 1e-3
     );
+    if let Some(prediction) = prediction {
+        print_prediction(prediction, row);
+    }
+    outln!("");
     if !row.overrides.is_empty() {
         protocol_lines(row)
             .lines()
@@ -110,12 +139,76 @@ fn print_recommendation(recommendation: &Recommendation<'_>, own: Option<&str>) 
     }
 }
 
+/// What was predicted of a row, and whether its measurement agrees.
+fn print_prediction(prediction: &Prediction, row: &Row) {
+    let Predicted { value, low, high } = prediction.rmse_mm;
+    let measured = bound(row.rmse_mm.value);
+    outln!("  {measured} mm on all presses, predicted {value:.2} mm [{low:.2}, {high:.2}]");
+    let holds = row
+        .rmse_mm
+        .value
+        .is_some_and(|mm| prediction.rmse_mm.contains(mm));
+    if !holds {
+        outln!("  OUTSIDE the prediction: confirm this choice on a new session");
+    }
+}
+
+/// How many of the random combinations measure what was predicted.
+fn check_in_words(result: &Tradeoff) -> String {
+    let checks = || result.predictions.of.iter().filter(|p| p.is_check);
+    let all = checks().count();
+    if all == 0 {
+        return "no prediction to check: too few combinations locate enough presses".to_owned();
+    }
+    let holds = |p: &&Prediction| {
+        let row = &result.rows[p.row];
+        row.rmse_mm.value.is_some_and(|mm| p.rmse_mm.contains(mm))
+    };
+    let in_time = |p: &&Prediction| {
+        let row = &result.rows[p.row];
+        p.cpu_us.is_some_and(|us| us.contains(row.cpu_us))
+    };
+    format!(
+        "checked on {all} random combinations: the predicted interval holds for the RMSE of {}, for the CPU time of {}",
+        checks().filter(holds).count(),
+        checks().filter(in_time).count()
+    )
+}
+
 const fn cost_name(cost: CostKind) -> &'static str {
     match cost {
         CostKind::Cpu => "CPU time",
         CostKind::Bytes => "bytes",
         CostKind::Delay => "delay",
     }
+}
+
+/// A flag that the first ctrl-C sets; the second ends the program.
+fn leave_on_ctrl_c() -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    on_ctrl_c(move |times| {
+        if times > 1 {
+            std::process::exit(i32::from(Exit::Stopped.code()));
+        }
+        asked.store(true, Ordering::Relaxed);
+    })
+    .map_err(Failure::internal)?;
+    Ok(stop)
+}
+
+/// The best choice so far, with its interval.
+fn progress_in_words(progress: &Progress<'_>) -> String {
+    let best = progress.best.map(|row| {
+        let [value, low, high] = [row.rmse_mm.value, row.rmse_mm.low, row.rmse_mm.high].map(bound);
+        let name = label(&row.choice);
+        format!(", best so far: {name}, {value} mm [{low}, {high}]")
+    });
+    format!(
+        "choice {} (ctrl-C leaves with the best so far){}",
+        progress.measured,
+        best.unwrap_or_default()
+    )
 }
 
 /// The rig of a session, in words.
@@ -153,19 +246,34 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     }
     let plan = Plan {
         full: args.full,
+        checks: usize::from(args.check),
         repeats: args.repeats,
         least_located: args.min_located.map(|percent| percent / 100.0),
     };
-    let phase = Phase::reading("measuring every choice", aligned.events.bytes_read());
-    let measured = measure(&aligned.input, &aligned.events, plan, &mut thread_cpu_s);
-    drop(phase);
+    let measured = {
+        let stop = leave_on_ctrl_c()?;
+        if args.full {
+            errln!("measuring all combinations; ctrl-C leaves with the best so far");
+        }
+        let phase = Phase::reading("reading", aligned.events.bytes_read());
+        let mut watch = |progress: &Progress<'_>| {
+            phase.say(progress_in_words(progress));
+            if stop.load(Ordering::Relaxed) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let (input, events) = (&aligned.input, &aligned.events);
+        measure(input, events, plan, &mut thread_cpu_s, &mut watch)
+    };
     let measured = measured.map_err(|e| match e {
         AnalysisError::Invalid(_) => Failure::limit(e),
         other => Failure::input(other),
     })?;
     let recommendations = recommendations(&measured, args);
     let result = &measured.tradeoff;
-    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "variant": variant, "tradeoff": result });
+    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "variant": variant, "machine": machine(), "tradeoff": result });
     let found = recommendations.iter().map(|a| {
         let found = a.found.as_ref().ok();
         let row = found.map(|f| f.row);
@@ -198,20 +306,33 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         let own = variant.as_ref().map(|v| v.changed.join(", "));
         recommendations
             .iter()
-            .for_each(|a| print_recommendation(a, own.as_deref()));
-        let table = terminal_table(
-            result,
-            if output.verbose {
+            .for_each(|a| print_recommendation(a, own.as_deref(), &result.predictions));
+        if args.check > 0 {
+            outln!("{}\n", check_in_words(result));
+        }
+        if recommendations.is_empty() || output.verbose {
+            let rows = if output.verbose {
                 Rows::All
             } else {
                 Rows::Front
-            },
-            &rig,
-            crate::terminal::is_coloured(&std::io::stdout()),
-        );
-        crate::terminal::out(format_args!("{table}"));
+            };
+            let color = crate::terminal::is_coloured(&std::io::stdout());
+            let table = terminal_table(result, rows, &rig, color);
+            crate::terminal::out(format_args!("{table}"));
+        } else {
+            let (tried, of) = (result.rows.len(), result.predictions.combinations);
+            outln!("{rig}\n{tried} of {of} choices tried; the page and -v have the table");
+        }
         outln!("\npage     {}", html_path.display());
         outln!("results  {}", json_path.display());
+    }
+    if result.is_interrupted {
+        errln!(
+            "INTERRUPTED after {} of {} choices: the answer is the best so far",
+            result.rows.len(),
+            result.predictions.combinations
+        );
+        return Ok(Exit::Stopped);
     }
     let unmet =
         |a: &Recommendation<'_>| Some((a.question.clone(), refusal(a.found.as_ref().err()?)));

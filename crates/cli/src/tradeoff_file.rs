@@ -10,7 +10,7 @@ use skinrig_analysis::tradeoff::Tradeoff;
 use crate::analyses::tradeoff_path;
 
 /// Values of the document's `format` and `format_version`.
-pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 1);
+pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 2);
 
 /// The trade-off results beside a session cannot be used.
 #[derive(Debug, thiserror::Error)]

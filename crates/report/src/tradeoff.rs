@@ -126,12 +126,13 @@ fn table(result: &Tradeoff, rows: Rows) -> Table {
 pub fn terminal_table(result: &Tradeoff, rows: Rows, rig: &str, color: bool) -> String {
     let (used, of) = result.scored;
     let mut out = format!(
-        "{}\n{} choices tried on {used} of {of} attempted scoring presses (n: those that count),\n\
+        "{}\n{} of {} choices tried on {used} of {of} attempted scoring presses (n: those that count),\n\
          each calibrated (model {}) on {} of {} others.\n\
          A choice competes when it locates at least {} % of the presses; others are in brackets.\n\
          Front: c CPU time, b bytes, d delay. CPU: median of {} runs over {} presses, both cameras.\n\n",
         crate::format::plain(rig),
         result.rows.len(),
+        result.predictions.combinations,
         model(result),
         result.calibrating.0,
         result.calibrating.1,

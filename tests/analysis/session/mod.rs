@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod exclusions;
+mod predictions;
 mod tradeoff;
 
 use std::sync::atomic::{AtomicU32, Ordering};

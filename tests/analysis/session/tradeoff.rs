@@ -1,6 +1,8 @@
 //! Every row of a tradeoff is what an analysis with its settings says, to the last bit.
 
-use skinrig_analysis::tradeoff::{Choice, Cost, Plan, Requirement, measure};
+use std::ops::ControlFlow;
+
+use skinrig_analysis::tradeoff::{Choice, Cost, Plan, Progress, Requirement, measure};
 use skinrig_analysis::{SessionInput, analyze};
 use skinrig_model::{AnalysisSettings, CalibrationModel};
 
@@ -9,9 +11,15 @@ use skinrig_planted::grid::session;
 
 const PLAN: Plan = Plan {
     full: false,
+    checks: 0,
     repeats: 3,
     least_located: None,
 };
+
+/// Goes on to the end.
+fn on(_: &Progress<'_>) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
 
 /// A stopwatch whose every measurement lasts one second longer than the one before.
 fn ticking() -> impl FnMut() -> f64 {
@@ -34,7 +42,7 @@ fn with_settings(input: &SessionInput, settings: AnalysisSettings) -> SessionInp
 fn each_row_equals_an_analysis_with_its_settings() {
     let (mut input, memory) = session();
     input.settings.bootstrap_resamples = 50;
-    let result = measure(&input, &memory, PLAN, &mut ticking())
+    let result = measure(&input, &memory, PLAN, &mut ticking(), &mut on)
         .unwrap()
         .tradeoff;
     assert_eq!((result.calibrating, result.scored), ((25, 25), (25, 25)));
@@ -42,7 +50,7 @@ fn each_row_equals_an_analysis_with_its_settings() {
     assert_ne!(result.model, CalibrationModel::Auto);
     for (i, row) in result.rows.iter().enumerate() {
         // One of each kind of change, and some combinations.
-        if i % 3 != 0 && i > 20 {
+        if i % 9 != 0 && i > 20 {
             continue;
         }
         let settings = row
@@ -77,9 +85,11 @@ fn results_do_not_depend_on_times_and_costs_follow_the_choice() {
     let (mut input, memory) = session();
     input.settings.bootstrap_resamples = 20;
     let mut still = || 0.0;
-    let measured = measure(&input, &memory, PLAN, &mut ticking()).unwrap();
+    let measured = measure(&input, &memory, PLAN, &mut ticking(), &mut on).unwrap();
     let one = &measured.tradeoff;
-    let two = measure(&input, &memory, PLAN, &mut still).unwrap().tradeoff;
+    let two = measure(&input, &memory, PLAN, &mut still, &mut on)
+        .unwrap()
+        .tradeoff;
     for (a, b) in one.rows.iter().zip(&two.rows) {
         assert_eq!(
             (a.choice, a.rmse_mm, a.bytes_per_s),
@@ -132,6 +142,44 @@ fn a_session_without_clocks_has_nothing_to_compare() {
         .iter_mut()
         .flatten()
         .for_each(|o| o.timing = None);
-    let error = measure(&input, &memory, PLAN, &mut || 0.0).unwrap_err();
+    let error = measure(&input, &memory, PLAN, &mut || 0.0, &mut on).unwrap_err();
     assert!(error.to_string().contains("skinrig analyze"), "{error}");
+}
+
+#[test]
+fn an_interrupted_measurement_keeps_what_it_measured() {
+    let (mut input, memory) = session();
+    input.settings.bootstrap_resamples = 50;
+    let mut best = Vec::new();
+    let mut watch = |progress: &Progress<'_>| {
+        best.push(progress.best.and_then(|row| row.rmse_mm.value).unwrap());
+        if progress.measured < 12 {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
+    };
+    let measured = measure(&input, &memory, PLAN, &mut ticking(), &mut watch).unwrap();
+    let rows = &measured.tradeoff.rows;
+    assert!(measured.tradeoff.is_interrupted && rows.len() == 12);
+    assert!(
+        best.len() == 12 && best.is_sorted_by(|a, b| a >= b),
+        "{best:?}"
+    );
+    let competing = rows.iter().filter(|r| r.competes);
+    let least = competing
+        .filter_map(|r| r.rmse_mm.value)
+        .fold(f64::MAX, f64::min);
+    assert_eq!(best.last(), Some(&least));
+    assert!(rows.iter().all(|r| r.cpu_us > 0.0) && measured.tradeoff.predictions.of.is_empty());
+    assert!(
+        measured
+            .select(Requirement::Budget(1e12, Cost::Cpu))
+            .is_ok()
+    );
+    let whole = measure(&input, &memory, PLAN, &mut ticking(), &mut on).unwrap();
+    assert!(!whole.tradeoff.is_interrupted);
+    for (part, whole) in rows.iter().zip(&whole.tradeoff.rows) {
+        assert_eq!((part.choice, part.rmse_mm), (whole.choice, whole.rmse_mm));
+    }
 }

@@ -61,13 +61,57 @@ pub fn plan() -> Vec<(PressRole, u32, u32, Point2, f64)> {
     out
 }
 
-/// The session and its events: 600 per press and camera, and background.
+/// What the cameras see of a press.
+#[derive(Debug, Clone, Copy)]
+pub struct Shape {
+    /// Events per press and camera.
+    pub events: u32,
+    /// Standard deviation of the columns and rows of its events, px.
+    pub spread_px: (f64, f64),
+    /// Shift of the columns from contact to release, px.
+    pub drift_px: f64,
+    /// Background events per camera.
+    pub background: u32,
+}
+
+impl Shape {
+    /// 600 events, 8 by 6 px.
+    pub const USUAL: Self = Self {
+        events: 600,
+        spread_px: (8.0, 6.0),
+        drift_px: 0.0,
+        background: 10_000,
+    };
+
+    /// A shape drawn by a seed.
+    #[must_use]
+    pub fn drawn(seed: u64) -> Self {
+        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let mut between = |low: f64, high: f64| low + (high - low) * random.unit();
+        // The first draws of nearby seeds are alike.
+        (0..8).for_each(|_| _ = between(0.0, 1.0));
+        Self {
+            events: between(300.0, 1500.0) as u32,
+            spread_px: (between(4.0, 16.0), between(4.0, 12.0)),
+            drift_px: between(-6.0, 6.0),
+            background: between(2_000.0, 30_000.0) as u32,
+        }
+    }
+}
+
+/// The session and its events, of the usual shape.
+#[must_use]
+pub fn session() -> (SessionInput, Memory) {
+    session_of(7, &Shape::USUAL)
+}
+
+/// The session and its events: presses of this shape, and background.
 ///
 /// # Panics
 /// Never: all locations are in view of both cameras.
 #[must_use]
-pub fn session() -> (SessionInput, Memory) {
-    let mut random = Random(7);
+pub fn session_of(seed: u64, shape: &Shape) -> (SessionInput, Memory) {
+    let mut random = Random(seed);
     let planted = StereoGeometry::paper_like(PLANTED);
     let mut input = crate::session(
         RigGeometry {
@@ -101,17 +145,18 @@ pub fn session() -> (SessionInput, Memory) {
             let u = planted.cameras[k]
                 .column_of_point(at)
                 .expect("all locations are in view");
-            for n in 0..600 {
-                let after = if n < 400 {
+            for n in 0..shape.events {
+                let after = if 3 * n < 2 * shape.events {
                     0.1 * random.unit()
                 } else {
                     0.3 + 0.15 * random.unit()
                 };
-                let x = (u + 8.0 * random.normal()).round().clamp(0.0, 639.0);
-                let y = (270.0 + 6.0 * random.normal()).round();
+                let u = u + shape.drift_px * after / 0.45;
+                let x = (u + shape.spread_px.0 * random.normal()).round();
+                let y = (270.0 + shape.spread_px.1 * random.normal()).round();
                 events.push(CdEvent {
                     t_us: camera_us(k, contact + after) as u64,
-                    x: x as u16,
+                    x: x.clamp(0.0, 639.0) as u16,
                     y: y as u16,
                     polarity: Polarity::from_bit(n % 3 == 0),
                 });
@@ -119,7 +164,7 @@ pub fn session() -> (SessionInput, Memory) {
         }
     }
     for (k, events) in events.iter_mut().enumerate() {
-        for _ in 0..10_000 {
+        for _ in 0..shape.background {
             let t = camera_us(k, 97.0 * random.unit());
             let (x, y) = (640.0 * random.unit(), 480.0 * random.unit());
             let polarity = Polarity::from_bit(random.unit() < 0.5);

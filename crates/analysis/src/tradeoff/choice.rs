@@ -14,6 +14,11 @@ const WINDOWS_MS: [f64; 5] = [10.0, 20.0, 50.0, 100.0, 200.0];
 /// Longer than any press: a window that ends only with the release.
 pub(crate) const WHOLE_PRESS_MS: f64 = 60_000.0;
 
+/// Length of a press in distances between windows, ms.
+pub(super) const LONG_MS: f64 = 500.0;
+/// Parts of the rows.
+const REGIONS: [Region; 3] = [Region::Full, Region::Half, Region::Quarter];
+
 /// Part of the cropped rows to read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -133,45 +138,64 @@ impl Choice {
     }
 }
 
-/// Distinct choices to try, the session's own first.
+/// Every combination, the session's own choice first.
 #[must_use]
-pub(super) fn sweep(session: Choice, full: bool) -> Vec<Choice> {
+pub(super) fn all(session: Choice) -> Vec<Choice> {
     let mut all = vec![session];
-    let windows = || WINDOWS_MS.iter().map(|w| Some(*w)).chain([None]);
-    let regions = [Region::Full, Region::Half, Region::Quarter];
-    if full {
-        for how in ESTIMATORS {
-            for thinning in FACTORS {
-                for bin_px in SIDES_PX {
-                    for window_ms in windows() {
-                        all.extend(regions.map(|region| {
-                            let choice = session.with_estimator(how);
-                            Choice {
-                                thinning,
-                                bin_px,
-                                window_ms,
-                                region,
-                                ..choice
-                            }
-                        }));
-                    }
+    for how in ESTIMATORS {
+        for thinning in FACTORS {
+            for bin_px in SIDES_PX {
+                for window_ms in windows() {
+                    all.extend(REGIONS.map(|region| Choice {
+                        thinning,
+                        bin_px,
+                        window_ms,
+                        region,
+                        ..session.with_estimator(how)
+                    }));
                 }
             }
         }
-    } else {
-        all.extend(ESTIMATORS.map(|how| session.with_estimator(how)));
-        all.extend(FACTORS.map(|thinning| Choice {
-            thinning,
-            ..session
-        }));
-        all.extend(SIDES_PX.map(|bin_px| Choice { bin_px, ..session }));
-        all.extend(windows().map(|window_ms| Choice {
-            window_ms,
-            ..session
-        }));
-        all.extend(regions.map(|region| Choice { region, ..session }));
-        all.extend(candidates(session));
     }
+    distinct(all)
+}
+
+/// Single changes of the session's choice, then a few of every other estimator: the curves of which combinations are composed.
+#[must_use]
+pub(super) fn curves(session: Choice) -> Vec<Choice> {
+    let mut all = vec![session];
+    all.extend(ESTIMATORS.map(|how| session.with_estimator(how)));
+    all.extend(FACTORS.map(|thinning| Choice {
+        thinning,
+        ..session
+    }));
+    all.extend(SIDES_PX.map(|bin_px| Choice { bin_px, ..session }));
+    all.extend(windows().map(|window_ms| Choice {
+        window_ms,
+        ..session
+    }));
+    all.extend(REGIONS.map(|region| Choice { region, ..session }));
+    for how in ESTIMATORS.into_iter().filter(|how| how.2 == Precision::F64) {
+        let base = session.with_estimator(how);
+        all.extend([4, 16, 64, 256].map(|thinning| Choice { thinning, ..base }));
+        all.extend([20.0, 100.0].map(|ms| Choice {
+            window_ms: Some(ms),
+            ..base
+        }));
+        all.push(Choice { bin_px: 8, ..base });
+        all.push(Choice {
+            region: Region::Quarter,
+            ..base
+        });
+    }
+    distinct(all)
+}
+
+fn windows() -> impl Iterator<Item = Option<f64>> {
+    WINDOWS_MS.iter().map(|w| Some(*w)).chain([None])
+}
+
+fn distinct(all: Vec<Choice>) -> Vec<Choice> {
     let mut fresh: Vec<Choice> = Vec::new();
     for choice in all {
         if !fresh.contains(&choice) {
@@ -181,38 +205,12 @@ pub(super) fn sweep(session: Choice, full: bool) -> Vec<Choice> {
     fresh
 }
 
-/// Combinations that save in several ways at once: cheap estimators with short windows and thinned events, and clusters on
-/// coarse bins.
-fn candidates(session: Choice) -> Vec<Choice> {
-    let mut all = Vec::new();
-    for (estimator, precision) in [
-        (Estimator::Dbscan, Precision::F64),
-        (Estimator::ColumnMedian, Precision::F64),
-        (Estimator::HistogramPeak, Precision::F32),
-        (Estimator::Streaming, Precision::F32),
-    ] {
-        let how = (estimator, CentroidRule::LargestCluster, precision);
-        let choice = session.with_estimator(how);
-        for window_ms in [Some(20.0), Some(50.0), Some(100.0), None] {
-            for thinning in [1, 8, 64] {
-                all.push(Choice {
-                    window_ms,
-                    thinning,
-                    ..choice
-                });
-            }
-        }
-        for bin_px in [4, 8] {
-            for window_ms in [Some(100.0), None] {
-                all.push(Choice {
-                    window_ms,
-                    bin_px,
-                    ..choice
-                });
-            }
-        }
-    }
-    all
+/// True if the estimator has a variant in 32 bits.
+pub(super) const fn has_f32(choice: Choice) -> bool {
+    matches!(
+        choice.estimator,
+        Estimator::HistogramPeak | Estimator::Streaming
+    )
 }
 
 /// Overrides (`analysis.key`, value) that turn the settings `from` into `to`, as in a protocol.

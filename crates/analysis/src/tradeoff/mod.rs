@@ -7,8 +7,13 @@
 
 mod choice;
 mod front;
+mod measure;
+mod plan;
+mod predict;
 mod replay;
 mod rows;
+mod rule;
+mod search;
 #[cfg(test)]
 mod tests;
 mod timing;
@@ -17,8 +22,12 @@ mod winner;
 mod winner_tests;
 
 pub use choice::{Choice, Region};
+pub use plan::{Plan, Progress};
+pub use predict::{Predicted, Prediction, Predictions};
 pub use rows::{Cost, Row, Tradeoff};
 pub use winner::{Measured, Requirement, Selection, Unselected};
+
+use std::ops::ControlFlow;
 
 use skinrig_model::{AnalysisSettings, CalibrationModel, PressRole, ReductionSettings};
 
@@ -26,24 +35,11 @@ use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
 use crate::locator::FittedLocator;
 use crate::press_events::Retention;
+use measure::Measuring;
 use replay::Replay;
-use timing::Candidate;
 
-/// A choice does not compete if it locates fewer presses than the session's own by more than this share.
-const LOCATED_MARGIN: f64 = 0.01;
-
-/// Choices to try.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan {
-    /// Try every combination instead of single changes and promising combinations.
-    pub full: bool,
-    /// Timed runs per choice, at least 1.
-    pub repeats: u32,
-    /// Minimum located rate to compete, 0..=1; `None`: that of the session's own settings minus 1 %.
-    pub least_located: Option<f64>,
-}
-
-/// Reads the session once and measures every choice of the plan. `stopwatch` returns the CPU time of this thread, s.
+/// Reads the session once and measures every choice of the plan. `stopwatch` returns the CPU time of this thread, s. `watch`
+/// is called after every choice; once it breaks, only the times of the choices so far are measured.
 ///
 /// # Errors
 /// Errors of [`crate::analyze`], [`AnalysisError::Invalid`] and [`AnalysisError::NothingToCompare`].
@@ -52,6 +48,7 @@ pub fn measure(
     source: &dyn EventSource,
     plan: Plan,
     stopwatch: &mut dyn FnMut() -> f64,
+    watch: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Measured, AnalysisError> {
     let session = &input.settings;
     // Keep whole presses, and skip the studies of the analysis.
@@ -79,63 +76,43 @@ pub fn measure(
     };
     let locator = FittedLocator::of(&analysis)?.locator();
     let press_s = replay.press_s(&reading.settings);
-    let mut rows = Vec::new();
-    let mut candidates = Vec::new();
-    let mut errors = Vec::new();
-    for choice in choice::sweep(Choice::of(session), plan.full) {
-        let crop = replay.region_rows(&reading.settings, choice.region);
-        let settings = choice.settings(session, crop, model, locator);
-        let outcome = replay.run(&settings);
-        let bits = bits_per_event(&settings);
-        errors.push(outcome.errors);
-        rows.push(Row {
-            choice,
-            rows: crop,
-            overrides: choice::overrides(session, &settings),
-            rmse_mm: outcome.metrics.rmse_mm,
-            penalised_rmse_mm: outcome.penalised.rmse_mm,
-            located_rate: outcome.metrics.located_rate,
-            within_rate: outcome.metrics.within_rate,
-            events_per_press: outcome.events_per_press,
-            bytes_per_s: outcome.events_per_press * bits / 8.0 / press_s,
-            delay_ms: outcome.delay_ms,
-            cpu_us: 0.0,
-            cpu_range_us: (0.0, 0.0),
-            competes: false,
-            fronts: Vec::new(),
-        });
-        candidates.push(Candidate {
-            settings,
-            locator: outcome.located.fitted(),
-        });
-    }
-    let outline = &input.rig.outline;
+    let mut measuring = Measuring {
+        replay: &replay,
+        session,
+        reading: &reading.settings,
+        model,
+        locator,
+        press_s,
+        plan,
+        rows: Vec::new(),
+        candidates: Vec::new(),
+        errors: Vec::new(),
+        points: Vec::new(),
+        best: None,
+        is_stopped: false,
+        watch,
+    };
+    let mut predictions = measuring.measure();
     let repeats = plan.repeats.max(1);
-    let (times, timed_presses) = timing::run(&replay, outline, &candidates, repeats, stopwatch);
-    for (row, time) in rows.iter_mut().zip(times) {
-        (row.cpu_us, row.cpu_range_us) = (time.median_us, time.range_us);
-    }
-    let own = rows[0].located_rate.value.unwrap_or(0.0);
+    let timed_presses = measuring.time(repeats, stopwatch);
+    measuring.predict(&mut predictions);
+    let least_located = measuring.least_located();
+    let is_interrupted = measuring.is_stopped;
+    let Measuring { rows, errors, .. } = measuring;
     let mut tradeoff = Tradeoff {
         settings: session.clone(),
         model,
         locator,
         calibrating: replay.counts(PressRole::Calibrate),
         scored: replay.counts(PressRole::Score),
-        least_located: plan
-            .least_located
-            .unwrap_or((own - LOCATED_MARGIN).max(0.0)),
+        least_located,
         timed_presses,
         repeats,
         press_s,
         rows,
+        predictions,
+        is_interrupted,
     };
     front::mark_fronts(&mut tradeoff);
     Ok(Measured { tradeoff, errors })
-}
-
-/// Bits per event of the settings; halving columns or rows shortens a pixel address by one bit.
-fn bits_per_event(settings: &AnalysisSettings) -> f64 {
-    let saved = 2 * u32::from(settings.bin_px).trailing_zeros();
-    (settings.bits_per_event - f64::from(saved)).max(1.0)
 }

@@ -1,6 +1,6 @@
 //! Replays the retained presses under other settings.
 
-use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole};
+use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, SkinOutline};
 
 use super::choice::Region;
 use super::winner::PressErrors;
@@ -80,6 +80,11 @@ impl<'a> Replay<'a> {
             rows,
             untimed: untimed::of_session(input),
         })
+    }
+
+    /// Outline of the skin.
+    pub(super) const fn outline(&self) -> &'a SkinOutline {
+        &self.input.rig.outline
     }
 
     /// Participating presses of this role, and the number of attempted ones in the plan.

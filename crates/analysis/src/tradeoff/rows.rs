@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::{AnalysisSettings, CalibrationModel, Locator};
 
 use super::choice::Choice;
+use super::predict::Predictions;
 use crate::result::Estimate;
 
 /// A cost to trade for accuracy.
@@ -56,6 +57,10 @@ pub struct Tradeoff {
     pub press_s: f64,
     /// One row per choice, the session's own first.
     pub rows: Vec<Row>,
+    /// How they were found, and what was predicted of them.
+    pub predictions: Predictions,
+    /// True if the operator stopped before all choices of the plan were measured.
+    pub is_interrupted: bool,
 }
 
 /// One choice with its results.

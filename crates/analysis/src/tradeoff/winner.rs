@@ -48,6 +48,8 @@ pub struct Measured {
 pub struct Selection<'a> {
     /// Its row.
     pub row: &'a Row,
+    /// Index of the row.
+    pub index: usize,
     /// RMSE on the presses that did not rank the choices.
     pub confirmed_mm: Estimate,
 }
@@ -83,6 +85,7 @@ impl Measured {
             let confirmed_mm = self.confirm(row, &ranking);
             let selection = Ok(Selection {
                 row: &self.tradeoff.rows[row],
+                index: row,
                 confirmed_mm,
             });
             let Requirement::Target(mm, _) = requirement else {

@@ -137,9 +137,13 @@ pub(crate) struct TradeoffArgs {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: u32,
 
-    /// Try every combination (thousands) instead of single changes and promising combinations.
+    /// Try every combination (thousands) instead of single changes, random draws and promising combinations.
     #[arg(long)]
     pub full: bool,
+
+    /// Measure this many further random combinations, and count how many measure what was predicted of them.
+    #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "full")]
+    pub check: u16,
 
     /// Where to write the page, with its results as JSON beside it [default: beside the session].
     #[arg(long, value_name = "FILE")]

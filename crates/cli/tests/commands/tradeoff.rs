@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Lab, skinrig, text};
+use crate::support::{Lab, program, skinrig, text};
 
 /// Nine places: a third of them chooses, the others confirm.
 const PLACES: &str = "path.points=[[10 mm, 2 mm], [-10 mm, 18 mm], [0 mm, -18 mm], [25 mm, 17 mm], [10 mm, 20 mm], \
@@ -85,6 +85,9 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
     }
     assert!(output["answers"][0]["row"]["cpu_us"].as_f64().unwrap() > 0.0);
     assert_eq!(output["answers"][0]["confirmed_mm"]["n"], 6);
+    let machine = &output["machine"];
+    assert_eq!(machine["architecture"], std::env::consts::ARCH);
+    assert!(machine["threads"].as_u64() >= Some(1), "{machine}");
     let page = std::fs::read_to_string(output["files"]["page"].as_str().unwrap()).unwrap();
     assert!(page.contains("<svg") && page.contains("</html>"), "{page}");
 }
@@ -100,6 +103,7 @@ fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
         "1",
         "--target-rmse",
         "1 um",
+        "-v",
     ])
     .code(4)
     .expect_stderr(&["--full"]);
@@ -114,6 +118,10 @@ fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
     assert!(answer < output.out.find("choices tried on").unwrap());
     let budget = ["tradeoff", &session, "--repeats", "1", "--budget", "10s"];
     let met = skinrig(&budget).code(0).out;
+    assert!(
+        met.lines().count() <= 20 && !met.contains("choices tried on"),
+        "{met}"
+    );
     let mut lines = met.lines();
     assert!(
         lines.next().unwrap().starts_with("most accurate within"),
@@ -160,4 +168,56 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
         .code(2)
         .expect_stderr(&["--out"]);
     assert_eq!(std::fs::read(&page).unwrap(), before);
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_leaves_with_the_best_so_far() {
+    use std::io::{BufRead, BufReader, Read};
+    use std::process::{Command, Stdio};
+    let lab = Lab::new();
+    let session = session(&lab);
+    let mut command = program(&["tradeoff", &session, "--full", "--budget", "10s"]);
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut messages = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("ctrl-C leaves") {
+        line.clear();
+        assert!(messages.read_line(&mut line).unwrap() > 0);
+    }
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &id]).status().unwrap();
+    assert!(sent.success());
+    let mut rest = String::new();
+    messages.read_to_string(&mut rest).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(5), "{rest}");
+    assert!(rest.contains("INTERRUPTED after "), "{rest}");
+    assert!(
+        rest.contains(" of 6930 choices: the answer is the best so far"),
+        "{rest}"
+    );
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(printed.starts_with("most accurate within"), "{printed}");
+    assert!(printed.contains("n 6 that did not choose"), "{printed}");
+}
+
+#[test]
+fn random_combinations_check_the_predictions() {
+    let lab = Lab::new();
+    let session = session(&lab);
+    let common = ["tradeoff", &session, "--repeats", "1", "--check", "3"];
+    let output = skinrig(&[&["--json"], &common[..]].concat()).code(0).json();
+    let of = output["tradeoff"]["predictions"]["of"].as_array().unwrap();
+    let checks = of.iter().filter(|p| p["is_check"] == true).count();
+    assert!(checks == 3 || of.is_empty(), "{of:?}");
+    assert_eq!(output["tradeoff"]["predictions"]["combinations"], 6930);
+    let printed = skinrig(&common).code(0).out;
+    let says = ["checked on 3 random combinations", "no prediction to check"];
+    assert!(says.iter().any(|s| printed.starts_with(s)), "{printed}");
+    skinrig(&["tradeoff", &session, "--full", "--check", "3"]).code(2);
 }

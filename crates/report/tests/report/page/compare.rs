@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use skinrig_analysis::tradeoff::{Choice, Cost, Region, Row, Tradeoff};
+use skinrig_analysis::tradeoff::{Choice, Cost, Predictions, Region, Row, Tradeoff};
 use skinrig_compare::{
     Comparison, ComparisonOptions, Metric, Session, SessionFacts, Subject, compare,
 };
@@ -99,6 +99,11 @@ fn row(estimator: Estimator, window_ms: Option<f64>, rmse: f64, fronts: &[Cost])
 
 fn measured() -> Tradeoff {
     Tradeoff {
+        is_interrupted: false,
+        predictions: Predictions {
+            combinations: 6930,
+            ..Predictions::default()
+        },
         settings: support::analysis(2, 2).settings,
         model: CalibrationModel::Auto,
         locator: Locator::Geometry,
