@@ -1,5 +1,4 @@
 //! Differences between simulation levels in the figures that a scene can set tolerances on, over simulated skins with equal seeds.
-#![expect(clippy::print_stdout, reason = "prints the table that the model holds")]
 
 use skinrig_analysis::analyze;
 use skinrig_model::SimLevel;
