@@ -259,7 +259,7 @@ fn provenance(p: &Provenance, analysis_version: u32) -> Vec<Fact> {
             format!("{name} {mean:+} {unit} [{low}, {high}]")
         };
         let all: Vec<String> = p.differences_from_optical.iter().map(difference).collect();
-        let fact = plain("simulated, not optical", &all.join("; "));
+        let fact = plain("minus the optical level", &all.join("; "));
         facts.push(fact.wide(true));
     }
     if !p.overrides.is_empty() {
