@@ -217,8 +217,10 @@ impl Drop for Lease {
             let (file, entry) = &mut *held;
             entry.released = true;
             entry.beat_at = now();
-            // If this fails the next holder reports a takeover: closing the file releases the lock anyway.
+            // If this fails the next holder reports a takeover: the lock is released anyway.
             let _ = file::write(file, entry);
+            // A child process that is just being started still has the file open: closing it here would not release the lock.
+            let _ = file.unlock();
         }
     }
 }

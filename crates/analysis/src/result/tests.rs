@@ -236,6 +236,10 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "no scored press was attempted, so there are no metrics",
         ),
         (
+            json!({"kind": "sequential_looks", "looks": 2, "declared": 5}),
+            "the looks decided when to end: 95 % intervals do not allow for that, those of the looks do (2 of 5 taken)",
+        ),
+        (
             json!({"kind": "scheduled"}),
             "press times and positions come from a schedule, not from a measurement",
         ),
