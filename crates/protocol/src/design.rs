@@ -186,8 +186,14 @@ fn dilution(at: Point2, geometry: &StereoGeometry) -> [f64; 2] {
 mod tests {
     use super::*;
 
+    /// The published part of the skin in steps of 7 mm.
     fn grid(side: u32) -> Vec<Point2> {
-        let at = |i: u32| Point2::new(f64::from(i / side) * 7.0, f64::from(i % side) * 7.0);
+        let at = |i: u32| {
+            Point2::new(
+                f64::from(i / side) * 7.0 - 25.0,
+                f64::from(i % side) * 7.0 - 26.0,
+            )
+        };
         (0..side * side).map(at).collect()
     }
 
@@ -199,10 +205,11 @@ mod tests {
         sorted.sort_unstable();
         sorted.dedup();
         assert_eq!(sorted.len(), 27);
-        // Every location has a chosen one no farther than its diagonal neighbours.
+        // Every location has a chosen one within the length over which errors are alike.
         for at in &locations {
             let near = chosen.iter().map(|i| locations[*i].distance_mm(*at));
-            assert!(near.fold(f64::INFINITY, f64::min) < 10.0, "{at:?}");
+            let nearest_mm = near.fold(f64::INFINITY, f64::min);
+            assert!(nearest_mm < 15.0, "{at:?}: {nearest_mm} mm");
         }
         // More presses begin with the same ones.
         assert_eq!(
