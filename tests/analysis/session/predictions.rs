@@ -62,7 +62,7 @@ fn predictions_of_random_combinations_hold() {
 }
 
 #[test]
-#[ignore = "minutes: cargo test --release -p skinrig-analysis-tests -- --ignored --nocapture combinations_over_200_sessions"]
+#[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-analysis-tests -- --ignored --nocapture combinations_over_200_sessions"]
 fn combinations_over_200_sessions() {
     let [checks, picked] = held(1001..=1200);
     println!("random combinations: {checks:?}\npicked by the search: {picked:?}");

@@ -81,7 +81,7 @@ fn measured(seeds: std::ops::RangeInclusive<u64>) -> [LevelBias; 4] {
 }
 
 #[test]
-#[ignore = "minutes: cargo test --release -p skinrig-tests --test system level_bias -- --ignored --nocapture"]
+#[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-tests --test system level_bias -- --ignored --nocapture"]
 fn level_bias_over_twenty_skins() {
     for (figure, found) in SceneFigure::ALL.into_iter().zip(measured(1..=20)) {
         let LevelBias { mean, low, high } = found;
@@ -90,6 +90,11 @@ fn level_bias_over_twenty_skins() {
             figure.name(),
             figure.unit()
         );
+        // The table has these very skins, to two decimals.
+        let table = level_bias(SimLevel::Geometric, figure).expect("a bias");
+        for (found, table) in [(mean, table.mean), (low, table.low), (high, table.high)] {
+            assert!((found - table).abs() < 0.006, "{}: {table}", figure.name());
+        }
     }
 }
 

@@ -143,7 +143,7 @@ fn a_choice_beyond_the_target_is_rarely_selected() {
 }
 
 #[test]
-#[ignore = "minutes: cargo test --release -p skinrig-analysis --lib -- --ignored --nocapture selected_choices"]
+#[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-analysis --lib -- --ignored --nocapture selected_choices"]
 fn coverage_of_selected_choices() {
     const SESSIONS: u64 = 2000;
     let locations = |population: Population, name, locations| Population {

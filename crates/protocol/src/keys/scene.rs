@@ -17,7 +17,8 @@ pub(crate) struct SceneKeys {
     /// Properties of the session that its user relies on; `[event_rates, localisation]` when neither `needs`, `tolerances` nor `level` is set.
     #[setting(items = 1..=7, example = "[event_rates, localisation]")]
     needs: Option<Vec<SceneNeed>>,
-    /// How far figures of the session may be from those of the optical level, as measured over simulated skins.
+    /// How far figures of the session may be from those of the optical level, as measured over simulated skins with the published
+    /// cameras, 2 mm deep.
     tolerances: Option<ToleranceKeys>,
     /// The simulation level outright; must be sufficient for `needs` and `tolerances`.
     level: Option<SimLevel>,
@@ -121,11 +122,13 @@ impl SceneKeys {
             (None, ..) => Vec::new(),
         };
         let tolerances = tolerances.unwrap_or_default();
-        let skin_level = self.skin.as_ref().map(|_| SimLevel::Optical);
+        // Differences are measured for the published cameras only.
+        let unmeasured = self.cameras.is_some() && !tolerances.is_empty();
+        let own_level = (self.skin.is_some() || unmeasured).then_some(SimLevel::Optical);
         Scene {
             level: self
                 .level
-                .or(skin_level)
+                .or(own_level)
                 .unwrap_or_else(|| cheapest_level(&needs, &tolerances)),
             needs,
             tolerances,
@@ -178,7 +181,8 @@ impl SceneKeys {
 impl SceneKeys {
     fn within_tolerances(&self, level: SimLevel, field: &Field, out: &mut Collector) {
         let tolerances = self.tolerances.as_ref().map(ToleranceKeys::all);
-        let beyond = |t: &Tolerance| !t.allows(level);
+        let is_measured = self.cameras.is_none() || level == SimLevel::Optical;
+        let beyond = |t: &Tolerance| !is_measured || !t.allows(level);
         let Some(tolerance) = tolerances.unwrap_or_default().into_iter().find(beyond) else {
             return;
         };
@@ -186,6 +190,9 @@ impl SceneKeys {
         let difference = level_bias(level, tolerance.figure).map_or_else(
             || "which has no events".to_owned(),
             |LevelBias { mean, low, high }| {
+                if !is_measured {
+                    return "whose difference is not measured for other cameras".to_owned();
+                }
                 format!("whose difference is {mean} {unit}, 95 % interval [{low}, {high}]")
             },
         );

@@ -155,6 +155,13 @@ fn impossible_values_across_keys() {
     );
     finding(
         "needs: [event_rates, localisation, optical_error]",
+        "tolerances: {latency: 10 s}\n  level: geometric\n  cameras:\n    camera1: {position: [45 mm, -38 mm], half_field_of_view: 60 deg}\n    camera2: {position: [45 mm, 42 mm], half_field_of_view: 60 deg}",
+        "scene.level",
+        "the level does not meet the tolerances of the scene",
+        "is not measured for other cameras",
+    );
+    finding(
+        "needs: [event_rates, localisation, optical_error]",
         "tolerances: {}",
         "scene.tolerances",
         "no tolerance is given",

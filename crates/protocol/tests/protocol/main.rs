@@ -10,6 +10,7 @@ mod missing;
 mod notify;
 mod remaining;
 mod rig;
+mod scene;
 mod schedules;
 mod shipped;
 mod stop;
