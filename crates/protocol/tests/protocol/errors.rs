@@ -164,8 +164,8 @@ fn impossible_values_across_keys() {
         "needs: [event_rates, localisation, optical_error]",
         "tolerances: {}",
         "scene.tolerances",
-        "no tolerance is given",
-        "`localisation_rmse`",
+        "a required key is missing",
+        "at least one of `localisation_rmse`",
     );
     finding(
         "max: [60 mm, 52 mm, 30 mm]",
