@@ -233,6 +233,7 @@ fn analyze_by(
         pictures: [one.pictures, two.pictures].concat(),
         zooms: [one.zooms, two.zooms].concat(),
         campaign: None,
+        felt: None,
         motion: None,
     };
     evaluate(&mut analysis, input, &streams, &kept)?;

@@ -1,7 +1,7 @@
 //! Owns the input of an analysis: plain values and one event source.
 
 use skinrig_model::{
-    AnalysisSettings, BoxReport, CameraId, CdEvent, HostTime, PlannedPress, PressOutcome,
+    AnalysisSettings, BoxReport, CameraId, CdEvent, HostTime, PlannedPress, PressId, PressOutcome,
     RigGeometry, SentMark, TriggerEdge,
 };
 
@@ -58,6 +58,8 @@ pub struct SessionInput {
     pub outcomes: Vec<Option<PressOutcome>>,
     /// All superseded attempts, in any order.
     pub earlier: Vec<EarlierAttempt>,
+    /// Presses that stopped above their planned depth because they were felt: their outcomes hold what was reached.
+    pub stopped: Vec<PressId>,
     /// Trigger edges of each camera, in stream order, all channels.
     pub edges: [Vec<TriggerEdge>; 2],
     /// Marks that the trigger box sent.

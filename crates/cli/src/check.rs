@@ -174,7 +174,7 @@ fn with_numbers(plan: &Plan) -> Result<serde_json::Value, Failure> {
             Step::Press(p) => row["press"] = serde_json::json!(p.press),
             Step::Begin { repetition } => row["repetition"] = serde_json::json!(repetition),
             Step::Look { repetition, .. } => row["repetition"] = serde_json::json!(repetition),
-            Step::Travel { .. } | Step::Pause { .. } => {}
+            Step::Travel { .. } | Step::Pause { .. } | Step::Learn => {}
         }
     }
     Ok(value)
@@ -198,6 +198,7 @@ fn describe_step(step: &Step) -> String {
             format!("travel to ({x:.3}, {y:.3}, {z:.3}) mm at {speed_mm_s} mm/s within {within}")
         }
         Step::Pause { duration } => format!("pause {}", seconds(*duration)),
+        Step::Learn => "learn what a touch is".to_owned(),
         Step::Look { number, repetition } => format!("look {number}, after {repetition}"),
         Step::Press(p) => {
             let at = p

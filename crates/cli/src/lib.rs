@@ -44,11 +44,13 @@ mod run;
 mod salvage;
 mod sample_size;
 mod schema;
+mod sense;
 mod sessions;
 mod show;
 mod signals;
 pub mod sink;
 mod status;
+mod subprocess;
 mod supervise;
 mod tag;
 mod tradeoff;
@@ -146,6 +148,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Completions(a) => completions::completions(a),
         Command::Man(a) => man::man(a, json),
         Command::TakeLook(a) => looks::take_look(a),
+        Command::LearnSkin(a) => sense::learn_skin(a),
         Command::SuperviseArm => supervise::supervise(),
         Command::HoldArm(a) => hil::hold::hold(a),
     }

@@ -1,23 +1,17 @@
 //! Looks at a campaign that is under way: another process analyses the session file, and a replay repeats the recorded ones.
-//!
-//! Another process, because closing a file drops the locks of its process on it, here those of the recorder; and because a
-//! run must survive whatever its analysis does.
 
 use std::collections::VecDeque;
-use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
 
 use skinrig_controller::{LookFault, LookOutcome, Looks};
 use skinrig_model::{HostTime, Look};
 
 use crate::args::TakeLookArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::subprocess::{NoAnswer, Subprocess, be_polite};
 
 /// The hidden command that takes one look.
 const TAKE_LOOK: &str = "take-look";
-/// Politeness of that process: the run comes first.
-const NICE: i32 = 10;
 
 /// How a run takes its looks.
 #[derive(Debug, Clone, Default)]
@@ -72,7 +66,7 @@ impl Looks for RecordedLooks {
 struct SessionLooks {
     session: PathBuf,
     waits: bool,
-    process: Option<(u32, LookProcess)>,
+    process: Option<(u32, Subprocess)>,
     /// The newest look that waits for the process.
     due: Option<u32>,
     done: VecDeque<LookOutcome>,
@@ -115,67 +109,31 @@ impl SessionLooks {
         let Some(number) = self.due.take() else {
             return;
         };
-        match LookProcess::start(&self.session, number) {
+        let named = number.to_string();
+        let session = self.session.as_os_str();
+        let arguments = [
+            TAKE_LOOK.as_ref(),
+            session,
+            "--number".as_ref(),
+            named.as_ref(),
+        ];
+        match Subprocess::start(arguments) {
             Ok(process) => self.process = Some((number, process)),
-            Err(e) => self
-                .done
-                .push_back(outcome(number, Err(LookFault::Failed(e.to_string())))),
+            Err(e) => self.done.push_back(outcome(number, Err(e))),
         }
     }
 }
 
-fn outcome(number: u32, found: Result<Look, LookFault>) -> LookOutcome {
-    match found {
+fn outcome(number: u32, answer: Result<String, NoAnswer>) -> LookOutcome {
+    let look = answer
+        .map_err(|e| e.to_string())
+        .and_then(|json| serde_json::from_str(&json).map_err(|e| e.to_string()));
+    match look {
         Ok(look) => LookOutcome::Taken(look),
-        Err(why) => LookOutcome::NotTaken { number, why },
-    }
-}
-
-/// A running look; killed when dropped, so that it never delays the seal.
-struct LookProcess(Child);
-
-impl LookProcess {
-    fn start(session: &Path, number: u32) -> std::io::Result<Self> {
-        let child = Command::new(std::env::current_exe()?)
-            .arg(TAKE_LOOK)
-            .arg(session)
-            .args(["--number", &number.to_string()])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()?;
-        Ok(Self(child))
-    }
-
-    fn is_running(&mut self) -> bool {
-        matches!(self.0.try_wait(), Ok(None))
-    }
-
-    /// Waits for the end. The output is short enough for its pipe.
-    fn finish(mut self) -> Result<Look, LookFault> {
-        let failed = |e: &dyn std::fmt::Display| LookFault::Failed(e.to_string());
-        let (mut answer, mut message) = (String::new(), String::new());
-        let ended = self.0.wait().map_err(|e| failed(&e))?;
-        let pipes = (self.0.stdout.take(), self.0.stderr.take());
-        if let (Some(mut out), Some(mut err)) = pipes {
-            out.read_to_string(&mut answer).map_err(|e| failed(&e))?;
-            err.read_to_string(&mut message).map_err(|e| failed(&e))?;
-        }
-        if !ended.success() {
-            let first = message.lines().next().map(str::to_owned);
-            return Err(LookFault::Failed(
-                first.unwrap_or_else(|| format!("its process ended with {ended}")),
-            ));
-        }
-        serde_json::from_str(&answer).map_err(|e| failed(&e))
-    }
-}
-
-impl Drop for LookProcess {
-    fn drop(&mut self) {
-        // Both fail only for a process that has ended.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        Err(why) => LookOutcome::NotTaken {
+            number,
+            why: LookFault::Failed(why),
+        },
     }
 }
 
@@ -184,8 +142,7 @@ impl Drop for LookProcess {
 /// # Errors
 /// [`Failure::input`] when there is no such look.
 pub(crate) fn take_look(args: &TakeLookArgs) -> Outcome {
-    // A denied priority makes the look no less right.
-    let _ = rustix::process::nice(NICE);
+    be_polite();
     let look = skinrig_results::take_look(&args.session, args.number)?;
     outln!(
         "{}",

@@ -25,6 +25,7 @@ use crate::notify::{self, RunMessages};
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::rig::{self, RepeatedOperator, bench, gates, planted};
+use crate::sense::SenseMode;
 use crate::signals::Operator;
 use crate::sink::{ReplayExpectations, SessionSink};
 use crate::terminal::Output;
@@ -60,6 +61,8 @@ pub(crate) struct RunInputs<'a> {
     pub faults: &'a [PlantedFault],
     /// How the looks of the plan are taken.
     pub looks: LookMode,
+    /// How touches are felt, if the plan wants them felt.
+    pub sense: SenseMode,
 }
 
 /// Records `plan` on `rig` into a new session in `folder`, after the `preflight`; imports and replays have none, because
@@ -109,9 +112,14 @@ pub(crate) fn record(
     if intent.known.scheduled {
         settings.camera_lag = None;
     }
+    let formats = header.stream_formats;
     let mut run = Run::new(plan, header, rig, control, &mut sink)
         .with_settings(settings)
         .looking(intent.looks.at(&path));
+    if let Some(online) = plan.online {
+        let sense = intent.sense.at(&path, online, formats);
+        run = run.feeling(sense.map_err(Failure::internal)?);
+    }
     if let Some(mut preflight) = preflight {
         preflight.caller_checks.insert(0, gates::recorder(&path));
         run = run.checked(preflight);
@@ -274,6 +282,7 @@ pub(crate) fn simulated(
     let intent = RunInputs {
         faults: &faults,
         looks: LookMode::of_simulation(args.real_time),
+        sense: SenseMode::of_simulation(args.real_time),
         ..intent_of(&protocol, seed, summary.duration_s, command_line)
     };
     record(
@@ -362,6 +371,7 @@ pub(crate) fn intent_of<'a>(
         known: ReplayExpectations::default(),
         faults: &[],
         looks: LookMode::default(),
+        sense: SenseMode::default(),
     }
 }
 
@@ -415,6 +425,7 @@ fn replay(
         known: expectations(&reader).map_err(Failure::session)?,
         faults: &[],
         looks: LookMode::Recorded(decision(&reader).map_err(Failure::session)?),
+        sense: SenseMode::Recorded(reader.touches().map_err(Failure::session)?),
     };
     let rig = rig::replayed(recording, &header, &document)?;
     record(&intent, &plan, rig, folder, None, None, operator)

@@ -1,6 +1,8 @@
 //! Both cameras with their streams: the order of their chunks, their continuity in time, and data not yet taken.
 
-use skinrig_device::{CameraCapabilities, CameraSettings, DeviceError, EventCamera, SyncMode};
+use skinrig_device::{
+    CameraCapabilities, CameraSettings, DeviceError, EventCamera, OpenChunk, SyncMode,
+};
 use skinrig_model::{
     CameraId, DeviceIdentity, HostDuration, HostTime, RawChunk, RunFault, Setting,
 };
@@ -94,6 +96,11 @@ impl CameraStreams {
     /// See [`EventCamera::newest`].
     pub(crate) fn newest(&mut self, camera: CameraId, most: usize) -> Option<Vec<u8>> {
         self.devices[camera.index()].newest(most)
+    }
+
+    /// See [`EventCamera::open_chunk`].
+    pub(crate) fn open_chunk(&mut self, camera: CameraId, from: usize) -> Option<OpenChunk> {
+        self.devices[camera.index()].open_chunk(from)
     }
 
     /// Stops a camera and reads its remaining data; returns the result and the camera's notes.

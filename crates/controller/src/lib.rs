@@ -39,6 +39,7 @@ mod states;
 mod stream_probe;
 pub mod suspend;
 mod touch;
+mod touch_sense;
 mod trigger_line;
 mod verdict;
 pub mod watchdog;
@@ -56,6 +57,7 @@ pub use run::{Resume, Run, RunReport};
 pub use settings::ControllerSettings;
 pub use sink::RecordSink;
 pub use states::State;
+pub use touch_sense::{SenseAnswer, SenseFault, SensedTouch, TouchSense};
 pub use watchdog::{WatchLimits, Watchdog};
 
 pub use skinrig_model::fault::{

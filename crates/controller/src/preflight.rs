@@ -79,7 +79,7 @@ pub(crate) fn check_plan(
     for (n, step) in (1..).zip(&plan.steps) {
         let place = |what: &str| format!("step {n}, {what}");
         match step {
-            Step::Begin { .. } | Step::Look { .. } => {}
+            Step::Begin { .. } | Step::Look { .. } | Step::Learn => {}
             Step::Pause { duration } => {
                 if duration.0 < 0 {
                     let found = duration.to_string();
@@ -315,7 +315,7 @@ fn check_reach(
                     reach(n, p.at.at_height(-search.band_mm), search.speed_mm_s)?;
                 }
             }
-            Step::Begin { .. } | Step::Pause { .. } | Step::Look { .. } => {}
+            Step::Begin { .. } | Step::Pause { .. } | Step::Look { .. } | Step::Learn => {}
         }
     }
     if let Some(check) = &plan.surface_check {

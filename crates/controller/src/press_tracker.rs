@@ -248,6 +248,12 @@ impl PressTracker {
         self.depth = Some(Settling::new(target, &self.limits, t));
     }
 
+    /// The tip stops at height `z_mm` by a command at `t`, instead of at its depth.
+    pub(crate) fn stop_at(&mut self, z_mm: f64, t: HostTime) {
+        self.depth_mm = self.surface_mm() - z_mm;
+        self.indent_from(t);
+    }
+
     /// Sets target and command time of the upward motion.
     pub(crate) fn rise_to(&mut self, target: Point3<Skin>, t: HostTime) {
         self.up_from = Some(t);

@@ -178,6 +178,7 @@ impl ProgressTracker {
             }
             Record::Preflight(_) | Record::Resumed(_) => {}
             Record::Command { t, .. } | Record::Note { t, .. } => self.reached(*t),
+            Record::Touch(estimate) => self.reached(estimate.t),
             Record::Device { .. } | Record::Notification(_) => {}
         }
         &self.progress

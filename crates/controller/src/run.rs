@@ -13,6 +13,7 @@ use crate::executor::Executor;
 use crate::looks::{Looks, NoLooks};
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
+use crate::touch_sense::{NoSense, TouchSense};
 
 /// Data to continue an interrupted, stopped or faulted session.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,6 +81,7 @@ pub(crate) struct RunParts<'a> {
     pub(crate) settings: ControllerSettings,
     pub(crate) preflight: Option<Preflight>,
     pub(crate) looks: Box<dyn Looks>,
+    pub(crate) sense: Box<dyn TouchSense>,
 }
 
 impl Leg {
@@ -125,6 +127,7 @@ impl<'a> Run<'a> {
                 settings: ControllerSettings::default(),
                 preflight: None,
                 looks: Box::new(NoLooks),
+                sense: Box::new(NoSense),
             },
         }
     }
@@ -147,6 +150,13 @@ impl<'a> Run<'a> {
     #[must_use]
     pub fn looking(mut self, looks: Box<dyn Looks>) -> Self {
         self.parts.looks = looks;
+        self
+    }
+
+    /// Feels touches with `sense`; without it, a plan that wants them felt runs as if it did not.
+    #[must_use]
+    pub fn feeling(mut self, sense: Box<dyn TouchSense>) -> Self {
+        self.parts.sense = sense;
         self
     }
 
@@ -288,6 +298,7 @@ mod tests {
             surface_check: None,
             suspend: Suspend::default(),
             stop: None,
+            online: None,
             presses: Vec::new(),
             steps: Vec::new(),
         }

@@ -97,6 +97,34 @@ pub fn newest_words(chunk: &[u8], most: usize) -> Vec<u8> {
     chunk[begin..end].to_vec()
 }
 
+/// Bytes of the chunk that a camera is filling.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OpenChunk {
+    /// Number that the chunk will have.
+    pub seq: u64,
+    /// Position of the first of `bytes` in the chunk.
+    pub from: usize,
+    /// Bytes lost before the chunk.
+    pub lost_before: u64,
+    /// Whole words. The chunk will hold the same bytes at this position, unless a gap in their times splits it.
+    pub bytes: Vec<u8>,
+}
+
+impl OpenChunk {
+    /// The whole words of a chunk under way from `from` on; `None` without any.
+    #[must_use]
+    pub fn of(seq: u64, lost_before: u64, chunk: &[u8], from: usize) -> Option<Self> {
+        let end = chunk.len() / WORD_BYTES * WORD_BYTES;
+        let bytes = chunk.get(from..end).filter(|b| !b.is_empty())?;
+        Some(Self {
+            seq,
+            from,
+            lost_before,
+            bytes: bytes.to_vec(),
+        })
+    }
+}
+
 /// A source of raw event bytes.
 ///
 /// States: stopped -> [`start`](Self::start) -> streaming -> [`stop`](Self::stop) -> stopped.
@@ -147,6 +175,12 @@ pub trait EventCamera: Send {
     /// A copy of the newest bytes that are in no chunk yet, whole words, at most `most` bytes: for a look at what is happening. They are also
     /// part of the next chunk. `None` if the camera does not offer them, or needs longer: call again. The default does not.
     fn newest(&mut self, _most: usize) -> Option<Vec<u8>> {
+        None
+    }
+
+    /// A copy of the bytes from position `from` on of the chunk that is being filled, for what cannot wait until it is complete. `None`
+    /// if there are none, if the camera does not offer them, or needs longer: call again. The default does not.
+    fn open_chunk(&mut self, _from: usize) -> Option<OpenChunk> {
         None
     }
 

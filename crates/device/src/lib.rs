@@ -14,8 +14,8 @@ pub mod rig;
 pub mod trigger;
 
 pub use camera::{
-    CameraCapabilities, CameraSettings, EventCamera, NoiseFilter, PatternScan, Roi, SyncMode,
-    TestPattern, newest_words,
+    CameraCapabilities, CameraSettings, EventCamera, NoiseFilter, OpenChunk, PatternScan, Roi,
+    SyncMode, TestPattern, newest_words,
 };
 pub use clock::{Clock, RealClock};
 pub use detached::{DetachedBox, DetachedCamera, Timeouts};

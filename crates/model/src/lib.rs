@@ -33,6 +33,7 @@ pub mod stopping;
 pub mod stream;
 pub mod text;
 pub mod time;
+pub mod touch;
 pub mod trigger_box;
 
 pub use camera::{CameraModel, SENSOR_HEIGHT, SENSOR_WIDTH, StereoGeometry};
@@ -74,4 +75,5 @@ pub use stopping::{Look, StopAnswer, StopMetric, StopQuestion};
 pub use stream::{ChunkFacts, LostTime, RawChunk, StreamFormat};
 pub use text::UnknownName;
 pub use time::{HostDuration, HostTime};
+pub use touch::{Reaction, TouchEstimate, TouchKind, TouchRegion};
 pub use trigger_box::{BoxReport, BoxTime};

@@ -17,6 +17,7 @@ use crate::reason::{InterruptionReason, MissedReason};
 use crate::run_end::RunEnd;
 use crate::stream::{RawChunk, StreamFormat};
 use crate::time::HostTime;
+use crate::touch::TouchEstimate;
 use crate::trigger_box::BoxReport;
 
 /// Identity of a device.
@@ -245,6 +246,8 @@ pub enum Record {
         /// The note.
         text: String,
     },
+    /// A touch was felt, or a press reacted to it.
+    Touch(TouchEstimate),
     /// A message about the run was sent, or not. The only record that may follow [`Record::Ended`].
     Notification(Box<Notification>),
     /// The last record, except for notifications.

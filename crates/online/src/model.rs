@@ -1,6 +1,8 @@
 //! What the detector has learnt from calibration presses: the idle rate of every region, how a touch begins at each place, and
 //! how a release fades.
 
+use serde::{Deserialize, Serialize};
+
 use crate::regions::REGIONS;
 
 /// Length of the bins in which a fading release is described, slots: 50 ms.
@@ -9,7 +11,7 @@ pub(crate) const TAIL_BIN: u32 = 100;
 pub(crate) const TAIL_BINS: usize = 60;
 
 /// Start of a touch at a place: share of its events in each region.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Pattern {
     /// Mean measured position of its calibration presses, mm.
     pub at: [f64; 2],
@@ -18,7 +20,7 @@ pub(crate) struct Pattern {
 }
 
 /// Everything learnt.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TouchModel {
     /// Events per slot of each camera's regions on an idle skin; above 0.
     pub(crate) idle: [Vec<f64>; 2],

@@ -17,15 +17,22 @@ const HISTORY: usize = 1 << 17;
 /// Events of a window in each camera: 32 MiB.
 const MOST: usize = 1 << 22;
 
+/// Level of the region of a complete press.
+const LAST: f64 = 0.99;
+
 /// A position so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
     /// As the analysis states it.
     pub outcome: LocationOutcome,
-    /// Position with its region and flag; `None` without one.
+    /// Position with its flag, and the region that the locator states for a complete press; `None` without one.
     pub location: Option<Location>,
+    /// 95 % region that holds at every instant of the touch; `None` if the calibration presses do not determine it.
+    pub region: Option<Region>,
     /// Events of the window so far, in each camera.
     pub events: [u32; 2],
+    /// Clustered events in the weaker camera.
+    pub clustered: u32,
     /// False if a window began before the events that are kept, or holds too many: some did not count.
     pub complete: bool,
 }
@@ -35,7 +42,7 @@ pub struct Position {
 pub struct PositionRow {
     /// mm.
     pub at_mm: [f64; 2],
-    /// The region that the locator states for a complete press. Its coverage in an earlier instant is not 95 %.
+    /// 95 % region that holds at every instant of the touch; `None` if the calibration presses do not determine it.
     pub region: Option<Region>,
 }
 
@@ -46,7 +53,7 @@ impl Position {
         let location = self.location?;
         Some(PositionRow {
             at_mm: location.at,
-            region: location.region,
+            region: self.region,
         })
     }
 }
@@ -162,11 +169,24 @@ impl PositionEstimator {
     /// # Errors
     /// [`LocatorModelError`] if its locator cannot be rebuilt.
     pub fn of(analysis: &Analysis) -> Result<Self, LocatorModelError> {
-        Ok(Self {
-            cameras: CameraId::ALL.map(|camera| CameraWindow::new(&analysis.settings, camera)),
-            locator: FittedLocator::of(analysis)?,
-            outline: analysis.rig.outline,
-        })
+        let locator = FittedLocator::of(analysis)?;
+        Ok(Self::with(
+            &analysis.settings,
+            locator,
+            analysis.rig.outline,
+        ))
+    }
+
+    pub(crate) fn with(
+        settings: &AnalysisSettings,
+        locator: FittedLocator,
+        outline: SkinOutline,
+    ) -> Self {
+        Self {
+            cameras: CameraId::ALL.map(|camera| CameraWindow::new(settings, camera)),
+            locator,
+            outline,
+        }
     }
 
     /// Adds the next events of a camera.
@@ -187,7 +207,12 @@ impl PositionEstimator {
         self.cameras.iter_mut().for_each(CameraWindow::close);
     }
 
-    /// The position by the events before these times of the cameras, µs.
+    /// The 99 % region that the locator states for a complete press at this position.
+    pub(crate) fn last_region(&self, position: &Position) -> Option<Region> {
+        self.locator.at_level(position.location?.region?, LAST)
+    }
+
+    /// The position by the events before these times of the cameras, µs; without the region that holds at every instant.
     #[must_use]
     pub fn position(&mut self, until_us: [u64; 2]) -> Position {
         let [one, two] = &mut self.cameras;
@@ -196,7 +221,9 @@ impl PositionEstimator {
         Position {
             outcome,
             location,
+            region: None,
             events: seen.map(|s| s.1),
+            clustered: seen[0].0.cluster_events.min(seen[1].0.cluster_events),
             complete: self.cameras.iter().all(|c| c.complete),
         }
     }

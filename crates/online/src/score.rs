@@ -28,6 +28,18 @@ impl ScoredPress {
     /// The valid scored presses of an analysis that follow another press.
     #[must_use]
     pub fn of(analysis: &Analysis) -> Vec<Self> {
+        Self::chosen(analysis, |verdict| verdict == Verdict::Valid)
+    }
+
+    /// The same with those that were excluded for what the cameras saw: a press that was carried out and not felt is missed.
+    #[must_use]
+    pub(crate) fn carried_out(analysis: &Analysis) -> Vec<Self> {
+        Self::chosen(analysis, |verdict| {
+            matches!(verdict, Verdict::Valid | Verdict::Excluded)
+        })
+    }
+
+    fn chosen(analysis: &Analysis, counts: impl Fn(Verdict) -> bool) -> Vec<Self> {
         let us = |t: HostTime| t.0 as f64 * 1e-3;
         let mut timed: Vec<_> = analysis
             .presses
@@ -38,7 +50,7 @@ impl ScoredPress {
         timed.sort_by_key(|(_, _, timing)| timing.contact);
         let pairs = timed.windows(2).map(|pair| (pair[0].2, pair[1]));
         pairs
-            .filter(|(_, (_, p, _))| p.role == PressRole::Score && p.verdict == Verdict::Valid)
+            .filter(|(_, (_, p, _))| p.role == PressRole::Score && counts(p.verdict))
             .map(|(before, (row, _, timing))| Self {
                 row,
                 contact_us: us(timing.contact),

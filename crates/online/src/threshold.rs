@@ -6,7 +6,9 @@ use crate::interleave::interleave;
 use crate::log_table::nats;
 use crate::model::TouchModel;
 use crate::slots::Slots;
+use crate::stream::StreamError;
 use crate::training::{MARGIN_US, Training, TrainingError};
+use skinrig_analysis::locator::LocatorModelError;
 use skinrig_analysis::{EventSource, EventSourceError};
 use skinrig_model::{CameraId, CdEvent};
 
@@ -34,9 +36,21 @@ pub enum ThresholdError {
     /// No common time.
     #[error(transparent)]
     Clock(#[from] UnusableClock),
+    /// The locator of the analysis cannot be rebuilt.
+    #[error("the locator of the analysis: {0}")]
+    Locator(#[from] LocatorModelError),
     /// The events cannot be read.
     #[error("cannot read the events: {0}")]
     Events(#[from] EventSourceError),
+}
+
+impl From<StreamError> for ThresholdError {
+    fn from(error: StreamError) -> Self {
+        match error {
+            StreamError::Clock(e) => Self::Clock(e),
+            StreamError::Locator(e) => Self::Locator(e),
+        }
+    }
 }
 
 /// Part of the training that a slot belongs to.

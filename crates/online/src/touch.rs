@@ -44,8 +44,9 @@ impl Touch {
         let idle: f64 = model.idle.iter().flatten().sum();
         Self {
             begun: 0,
-            // A touch longer than any learnt press is possible; one that never ends would hide all others.
-            longest: 4 * model.longest_press,
+            // A touch somewhat longer than any learnt press is possible. One taken up at a release would otherwise last until the next
+            // press, whose release is taken for a touch again, and so on.
+            longest: model.longest_press + model.longest_press / 2,
             phase: Phase::Over,
             pressed: [vec![0; REGIONS], vec![0; REGIONS]],
             idle: (idle * WINDOW as f64) as u32,

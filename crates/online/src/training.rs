@@ -108,6 +108,12 @@ impl Training {
         &self.clocks
     }
 
+    /// Time in the middle of the presses, host µs.
+    pub(crate) fn middle_us(&self) -> f64 {
+        let first = self.presses.first().map_or(0.0, |p| p.contact_us);
+        0.5 * (first + self.end_us())
+    }
+
     /// End of the last press, host µs.
     #[must_use]
     pub fn end_us(&self) -> f64 {

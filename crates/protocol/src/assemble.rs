@@ -162,6 +162,15 @@ fn assemble(
         None => None,
     };
 
+    let online = match keys.online {
+        Some(Some(online)) => roles
+            .as_deref()
+            .and_then(|roles| online.online(roles, root.at("online"), out))
+            .map(Some),
+        Some(None) => Some(None),
+        None => None,
+    };
+
     let (path_kind, locations) = path?;
     let (depths_mm, roles, outline) = (depths_mm?, roles?, outline?);
     let scene = keys.scene?.scene(outline.centre);
@@ -231,6 +240,7 @@ fn assemble(
         surface_check: check??,
         suspend: keys.suspend?,
         stop: stop?,
+        online: online?,
         faults: keys.faults?.unwrap_or_default(),
         marks: keys.triggers?.marks,
         surface: keys.press?,

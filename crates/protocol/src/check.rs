@@ -183,7 +183,7 @@ pub fn check(plan: &Plan, around: &Surroundings, home: Option<Point3<Skin>>) -> 
                 checker.press(press, position);
                 position = Some(press.at.at_height(plan.limits.clearance_mm));
             }
-            Step::Begin { .. } | Step::Look { .. } => {}
+            Step::Begin { .. } | Step::Look { .. } | Step::Learn => {}
             Step::Pause { duration } => {
                 if duration.0 < 0 {
                     checker.add(

@@ -65,6 +65,7 @@ fn compile(protocol: &Protocol) -> Plan {
                 visits.swap(i, j as usize);
             }
         }
+        writer.learn_before(index as usize);
         let first = visits.first().and_then(|(l, _)| protocol.locations.get(*l));
         if index > 0 {
             if let Some(first) = first.filter(|_| protocol.return_to_start) {
@@ -113,6 +114,7 @@ fn compile(protocol: &Protocol) -> Plan {
         }),
         suspend: protocol.suspend,
         stop: protocol.stop.as_ref().map(|stop| stop.rule),
+        online: protocol.online,
         presses: writer.presses,
         steps: writer.steps,
     }
@@ -173,6 +175,15 @@ impl Writer<'_> {
         }
     }
 
+    /// What is felt is learnt before the first scored repetition.
+    fn learn_before(&mut self, repetition: usize) {
+        let is_scored = |role: &PressRole| *role == PressRole::Score;
+        let first = self.protocol.roles.iter().position(is_scored);
+        if self.protocol.online.is_some() && first == Some(repetition) {
+            self.steps.push(Step::Learn);
+        }
+    }
+
     fn press(&mut self, planned: PlannedPress, start_s: Option<f64>) {
         let id = PressId::from_index(self.presses.len() as u32);
         let (limits, motion) = (&self.protocol.limits, &self.protocol.motion);
@@ -186,6 +197,11 @@ impl Writer<'_> {
             approach_speed_mm_s: motion.approach.speed_mm_s(limits.clearance_mm),
             indent_speed_mm_s: motion.indent.speed_mm_s(depth_mm),
             hold: motion.hold,
+            react: self
+                .protocol
+                .online
+                .and_then(|o| o.react)
+                .filter(|_| planned.role == PressRole::Score),
             retract_speed_mm_s: motion.retract.speed_mm_s(limits.clearance_mm + depth_mm),
             marks: self.protocol.marks.clone(),
             deadline: HostDuration::ZERO,

@@ -11,6 +11,7 @@ use skinrig_model::{
 use skinrig_settings::Choice;
 
 use crate::area::Surroundings;
+use crate::online::{Online, React};
 use crate::retakes::Retakes;
 use crate::stop::Stop;
 use crate::surface::Surface;
@@ -49,6 +50,9 @@ pub struct Plan {
     /// When the campaign ends by itself; `None`: never before its last step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
+    /// How touches are felt while the session is recorded; `None`: not at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub online: Option<Online>,
     /// Every planned press; `presses[i].id == PressId::from_index(i)`, and the stored `id` is `i`.
     pub presses: Vec<PlannedPress>,
     /// The steps, in order.
@@ -145,6 +149,8 @@ pub enum Step {
         #[serde(with = "as_index")]
         repetition: RepetitionId,
     },
+    /// Learn to feel touches from the presses so far, for [`Plan::online`]. On a bench the run does not wait for it.
+    Learn,
 }
 
 /// One press, from clearance height above `at` and back to it.
@@ -170,6 +176,9 @@ pub struct PressStep {
     pub hold: HostDuration,
     /// Speed from depth to clearance height, mm/s.
     pub retract_speed_mm_s: f64,
+    /// What it does when it is felt; `None`: it goes on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub react: Option<React>,
     /// Moments that emit a mark on the trigger line.
     pub marks: Vec<MarkKind>,
     /// Longest time from the start of the downward motion to settled at clearance height.

@@ -13,6 +13,7 @@ use skinrig_settings::{Location, Settings};
 
 use crate::area::Surroundings;
 use crate::faults::PlantedFault;
+use crate::online::Online;
 use crate::plan::RunLimits;
 use crate::retakes::Retakes;
 use crate::stop::DeclaredStop;
@@ -82,6 +83,9 @@ pub struct Protocol {
     /// When the campaign ends by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop: Option<DeclaredStop>,
+    /// How touches are felt while the session is recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub online: Option<Online>,
     /// Injected faults; none in a real protocol.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<PlantedFault>,

@@ -64,6 +64,8 @@ impl Plan {
                     }
                     Step::Press(p) => pending(p.press),
                     Step::Look { .. } => n > looks_from,
+                    // Only what this leg presses can teach it: its clocks are new.
+                    Step::Learn => self.presses.iter().all(|p| pending(p.id)),
                 };
                 if is_kept {
                     steps.push(step.clone());
@@ -123,7 +125,7 @@ impl Plan {
                         *earlier = omitted;
                     }
                 }
-                Step::Travel { .. } | Step::Pause { .. } | Step::Look { .. } => {}
+                Step::Travel { .. } | Step::Pause { .. } | Step::Look { .. } | Step::Learn => {}
             }
         }
         for step in &mut rest.steps {
@@ -158,7 +160,7 @@ impl Plan {
                     position = Some(*to);
                 }
                 Step::Press(p) => position = Some(p.at.at_height(limits.clearance_mm)),
-                Step::Begin { .. } | Step::Pause { .. } | Step::Look { .. } => {}
+                Step::Begin { .. } | Step::Pause { .. } | Step::Look { .. } | Step::Learn => {}
             }
         }
     }

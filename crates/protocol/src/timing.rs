@@ -164,7 +164,7 @@ pub(crate) fn first_misfit(plan: &Plan) -> Option<TimingConflict> {
                 position = Some(*to);
             }
             Step::Pause { duration } => travel += duration.as_secs_f64(),
-            Step::Look { .. } => {}
+            Step::Look { .. } | Step::Learn => {}
             Step::Press(press) => {
                 position = Some(press.at.at_height(plan.limits.clearance_mm));
                 if let (Some(previous), Some(start)) = (before, press.start_after_begin)
@@ -212,7 +212,7 @@ pub(crate) fn duration_s(plan: &Plan) -> (f64, f64) {
                 position = Some(*to);
             }
             Step::Pause { duration } => now += duration.as_secs_f64(),
-            Step::Look { .. } => {}
+            Step::Look { .. } | Step::Learn => {}
             Step::Press(press) => {
                 if let Some(start) = press.start_after_begin {
                     now = now.max(begin + start.as_secs_f64());

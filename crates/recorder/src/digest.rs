@@ -27,7 +27,7 @@ const fn table(name: &'static str, since: u32, rows: &'static str) -> Table {
 }
 
 /// In the order in which the tree hash covers them.
-const TABLES: [Table; 22] = [
+const TABLES: [Table; 23] = [
     table("session", 1, "SELECT * FROM session ORDER BY id LIMIT ?1"),
     Table {
         name: "leg",
@@ -148,6 +148,7 @@ const TABLES: [Table; 22] = [
         12,
         "SELECT * FROM notification ORDER BY id LIMIT ?1",
     ),
+    table("touch", 13, "SELECT * FROM touch ORDER BY id LIMIT ?1"),
     Table {
         name: "run_end",
         since: 1,

@@ -214,6 +214,7 @@ impl Journal {
                     .await?;
                 Ok(())
             }
+            Record::Touch(it) => crate::touch::insert(&mut self.conn, &it).await,
             Record::Notification(it) => {
                 crate::notification::insert(&mut self.conn, self.leg, &it).await
             }

@@ -57,6 +57,10 @@ impl LegOffset {
             | Record::Note { t, .. }
             | Record::Ended { t, .. } => later(t)?,
             Record::MarkSent(mark) => later(&mut mark.t)?,
+            Record::Touch(estimate) => {
+                later(&mut estimate.t)?;
+                later(&mut estimate.until)?;
+            }
             Record::Poses(samples) => {
                 for sample in samples {
                     later(&mut sample.t)?;

@@ -50,6 +50,7 @@ mod salvage;
 mod schema;
 mod seal;
 mod totals;
+mod touch;
 mod worker;
 
 pub use catalogue::{SessionState, SessionSummary, list};

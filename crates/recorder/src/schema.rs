@@ -244,6 +244,7 @@ pub(crate) mod tests {
                 "DROP TABLE leg",
                 "DROP TABLE gap",
                 "DROP TABLE notification",
+                "DROP TABLE touch",
                 "DROP TABLE previous_table_digest",
                 "DROP TABLE previous_seal",
                 "ALTER TABLE attempt DROP COLUMN leg",
@@ -260,7 +261,14 @@ pub(crate) mod tests {
             }
             crate::digest::digest_tables(&mut conn).await.unwrap()
         });
-        let later = ["box_report", "preflight", "leg", "gap", "notification"];
+        let later = [
+            "box_report",
+            "preflight",
+            "leg",
+            "gap",
+            "notification",
+            "touch",
+        ];
         assert!(digests.iter().all(|d| !later.contains(&d.name.as_str())));
         assert_eq!(digests.len(), 15);
         let reader = crate::SessionReader::open(&path).unwrap();

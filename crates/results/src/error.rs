@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use skinrig_analysis::AnalysisError;
+use skinrig_online::ThresholdError;
 use skinrig_protocol::Diagnostics;
 use skinrig_recorder::RecorderError;
 
@@ -57,6 +58,9 @@ pub enum ResultsError {
     /// A plan that declares looks cannot be read.
     #[error("cannot read the plan in the session: {0}")]
     Plan(serde_json::Error),
+    /// The session does not teach what a touch is.
+    #[error(transparent)]
+    NotLearnt(#[from] NotLearnt),
     /// A look at a campaign found nothing that may be used.
     #[error("no look {number}: {why}")]
     NoLook {
@@ -68,4 +72,24 @@ pub enum ResultsError {
     /// The analysis rejects its input.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
+}
+
+/// Why a session does not teach what a touch is.
+#[derive(Debug, thiserror::Error)]
+pub enum NotLearnt {
+    /// Clocks start again in each leg.
+    #[error("expected a session recorded in one go, found {legs} legs")]
+    Legs {
+        /// Number of legs.
+        legs: usize,
+    },
+    /// Its results must not be used.
+    #[error("expected a valid session, found an INVALID one: {}", because.join("; "))]
+    Invalid {
+        /// Reasons, as the analysis states them.
+        because: Vec<String>,
+    },
+    /// Its calibration presses are too few, or unreadable.
+    #[error(transparent)]
+    Presses(#[from] ThresholdError),
 }

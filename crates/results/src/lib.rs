@@ -15,6 +15,7 @@ mod earlier;
 mod earlier_mismatch;
 mod error;
 mod events;
+mod learn_skin;
 mod origin;
 mod rig_document;
 mod session;
@@ -24,8 +25,9 @@ mod take_look;
 mod window;
 
 pub use earlier_mismatch::EarlierMismatch;
-pub use error::ResultsError;
+pub use error::{NotLearnt, ResultsError};
 pub use events::{Rescan, SessionEvents};
+pub use learn_skin::learn_skin;
 pub use origin::{Origin, differences_from_optical};
 pub use rig_document::RigDocument;
 pub use session::Session;

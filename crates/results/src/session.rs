@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{EarlierAttempt, LegStart, SessionInput};
-use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader, TriggerEdge};
+use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader, TouchKind, TriggerEdge};
 use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 
 use crate::contacts;
@@ -72,7 +72,10 @@ impl Session {
         let legs = further.map(|leg| LegStart::recorded(leg.origin, leg.camera_origin_us));
         let [delay_1, delay_2] = self.rig.trigger_delay_us;
         let reports = reader.box_reports()?.into_iter();
+        let touches = reader.touches()?.into_iter();
+        let stopped = touches.filter(|t| t.kind == TouchKind::Stopped);
         Ok(SessionInput {
+            stopped: stopped.filter_map(|t| Some(t.attempt?.press)).collect(),
             planned,
             outcomes,
             earlier,

@@ -1,5 +1,6 @@
 //! The stages from an open session to its analysis; each one returns its own value.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use skinrig_analysis::motion::MotionCourse;
@@ -8,7 +9,7 @@ use skinrig_analysis::result::{Motion, PressResult, Warning, WarningCause};
 use skinrig_analysis::{
     Analysis, LegStart, Retention, SessionInput, analyze_recalibrated, analyze_with_events, legs,
 };
-use skinrig_model::HostTime;
+use skinrig_model::{HostTime, PressId, Reaction};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::campaign;
@@ -96,6 +97,12 @@ impl AlignedSession {
         };
         let reference = wants_reference.then(|| reference_code(&self.input, &analysis, &kept));
         let motion = motion(&self.session.reader, &analysis)?;
+        let touches = self.session.reader.touches()?;
+        let rows = self.input.planned.iter().zip(&self.input.outcomes);
+        let depths: BTreeMap<PressId, f64> = rows
+            .filter_map(|(press, outcome)| Some((press.id, outcome.as_ref()?.measured_depth_mm?)))
+            .collect();
+        let felt = skinrig_online::felt(&analysis, &touches, |press| depths.get(&press).copied());
         let end = self.session.reader.end()?.map(|(_, end)| end);
         let plan_json = &self.session.header.plan_json;
         let campaign = campaign::looks(&analysis, plan_json, end.as_ref())?;
@@ -105,9 +112,18 @@ impl AlignedSession {
                 declared: found.declared,
             })
         }));
+        let reactions = felt.as_ref().and_then(|f| f.reactions.as_ref());
+        let stops = reactions.filter(|r| r.reaction == Reaction::Stop);
+        analysis.warnings.extend(stops.and_then(|r| {
+            Some(Warning::from(WarningCause::StoppedWhenFelt {
+                presses: r.depth_mm.n,
+                depth_mm: r.depth_mm.median?,
+            }))
+        }));
         Ok(AnalyzedSession {
             analysis: Analysis {
                 campaign,
+                felt,
                 reference,
                 motion,
                 ..analysis

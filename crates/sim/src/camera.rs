@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use skinrig_device::{
-    CameraCapabilities, CameraSettings, DeviceError, EventCamera, PatternScan, TestPattern,
-    newest_words,
+    CameraCapabilities, CameraSettings, DeviceError, EventCamera, OpenChunk, PatternScan,
+    TestPattern, newest_words,
 };
 use skinrig_formats::{Scanner, evt2};
 use skinrig_model::{
@@ -421,6 +421,11 @@ impl EventCamera for SimCamera {
 
     fn newest(&mut self, most: usize) -> Option<Vec<u8>> {
         Some(newest_words(&self.out.bytes, most))
+    }
+
+    fn open_chunk(&mut self, from: usize) -> Option<OpenChunk> {
+        let out = &self.out;
+        OpenChunk::of(out.seq, out.lost_before, &out.bytes, from)
     }
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {

@@ -79,6 +79,7 @@ fn input(s: &JoinedLegs) -> SessionInput {
         planned: Vec::new(),
         outcomes: Vec::new(),
         earlier: Vec::new(),
+        stopped: Vec::new(),
         edges: s.joined.edges.clone(),
         marks: Vec::new(),
         box_reports: s.joined.reports.clone(),

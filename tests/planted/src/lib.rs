@@ -38,6 +38,7 @@ pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
         planned: Vec::new(),
         outcomes: Vec::new(),
         earlier: Vec::new(),
+        stopped: Vec::new(),
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],

@@ -187,7 +187,7 @@ fn residual_mm(
 fn depth(path: &[&ObservedPress<'_>]) -> Option<Finding> {
     let pairs: Vec<(f64, f64)> = path
         .iter()
-        .filter_map(|t| Some((t.outcome.measured_depth_mm?, t.depth_mm)))
+        .filter_map(|t| Some((t.outcome.measured_depth_mm?, t.depth_mm?)))
         .filter(|(measured, planned)| measured.is_finite() && planned.is_finite())
         .collect();
     let off = |(measured, planned): &(f64, f64)| (measured - planned).abs();
@@ -212,7 +212,7 @@ fn depth(path: &[&ObservedPress<'_>]) -> Option<Finding> {
 /// The plan does not contain the commanded speed, but equal depths take equal time.
 fn speed(path: &[&ObservedPress<'_>]) -> Option<Finding> {
     let lasted = |t: &ObservedPress<'_>| {
-        let timing = t.timing?;
+        let timing = t.timing.filter(|_| t.depth_mm.is_some())?;
         let s = (timing.at_depth - timing.contact).as_secs_f64();
         (s > 0.0).then_some((t.place.1, s))
     };

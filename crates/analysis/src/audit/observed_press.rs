@@ -26,8 +26,8 @@ pub(crate) struct ObservedPress<'a> {
     pub place: (LocationId, u64),
     /// Planned position.
     pub planned: Point2,
-    /// Planned depth, mm.
-    pub depth_mm: f64,
+    /// Planned depth, mm; `None` if it stopped above because it was felt.
+    pub depth_mm: Option<f64>,
     /// Measured position, if finite.
     pub truth: Option<Point2>,
     /// Measured times.
@@ -86,7 +86,7 @@ pub(crate) fn observed_presses<'a>(
             repetition: planned.repetition,
             place: (planned.location, planned.depth_mm.to_bits()),
             planned: planned.at,
-            depth_mm: planned.depth_mm,
+            depth_mm: (!input.stopped.contains(&planned.id)).then_some(planned.depth_mm),
             truth,
             timing: outcome.timing,
             outcome,

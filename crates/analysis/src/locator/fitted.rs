@@ -12,7 +12,7 @@ use super::reading::Reading;
 use super::regions::{LEVEL, Regions, size};
 use super::robust::response;
 use crate::calibrate::PARAMETERS;
-use crate::result::{Analysis, LocationOutcome, LocatorModel, Region};
+use crate::result::{Analysis, LocationOutcome, LocatorModel, LocatorResult, Region};
 use crate::triangulate::locate;
 
 /// A position with what is known about its error.
@@ -114,9 +114,20 @@ impl FittedLocator {
     /// # Errors
     /// [`LocatorModelError`] if what the locator learnt was changed.
     pub fn of(analysis: &Analysis) -> Result<Self, LocatorModelError> {
-        match &analysis.locator {
-            Some(l) => Self::new(l.locator, analysis.geometry, l.model.clone()),
-            None => Ok(Self::rays(analysis.geometry)),
+        Self::restored(analysis.locator.as_ref(), analysis.geometry)
+    }
+
+    /// The locator of a result; the rays of this geometry without one.
+    ///
+    /// # Errors
+    /// [`LocatorModelError`] if what the locator learnt was changed.
+    pub fn restored(
+        result: Option<&LocatorResult>,
+        geometry: StereoGeometry,
+    ) -> Result<Self, LocatorModelError> {
+        match result {
+            Some(l) => Self::new(l.locator, geometry, l.model.clone()),
+            None => Ok(Self::rays(geometry)),
         }
     }
 
@@ -151,6 +162,20 @@ impl FittedLocator {
             at: prediction.at,
             region,
             extrapolated: prediction.extrapolated,
+        })
+    }
+
+    /// The region of another level in place of the 95 % one; `None` if the calibration presses do not determine it.
+    #[must_use]
+    pub fn at_level(&self, region: Region, level: f64) -> Option<Region> {
+        let factor = |level: f64| {
+            let found = self.model.levels.iter().find(|l| l.level == level);
+            found.map(|l| l.factor)
+        };
+        let scale = libm::sqrt(factor(level)? / factor(LEVEL)?);
+        Some(Region {
+            semi_axes_mm: region.semi_axes_mm.map(|axis| axis * scale),
+            ..region
         })
     }
 

@@ -10,6 +10,7 @@ mod evidence;
 mod evidence_parts;
 #[cfg(test)]
 mod evidence_tests;
+mod felt;
 mod indentation;
 mod latency;
 mod locator;
@@ -38,6 +39,7 @@ pub use evidence::Evidence;
 pub(crate) use evidence_parts::{
     FittingPlan, OnsetHeight, PeakForce, Response, SeenMarks, Silence,
 };
+pub use felt::{FeltReactions, FeltTouches, Spread};
 pub use indentation::{
     Indentation, NoQuantity, PressIndentation, Quantity, QuantityAtDepth, QuantityErrors, Ranged,
     ZeroReturn,
@@ -158,6 +160,9 @@ pub struct Analysis {
     /// Looks of a campaign that ends by itself; `None` if the plan declares none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub campaign: Option<CampaignLooks>,
+    /// Touches felt while the session was recorded; `None` if none were to be felt.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub felt: Option<FeltTouches>,
     /// How the robot followed its commands; `None` without poses ([`crate::motion`]).
     #[serde(default)]
     pub motion: Option<Motion>,

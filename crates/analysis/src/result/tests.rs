@@ -240,6 +240,10 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "the looks decided when to end: 95 % intervals do not allow for that, those of the looks do (2 of 5 taken)",
         ),
         (
+            json!({"kind": "stopped_when_felt", "presses": 162, "depth_mm": 0.45}),
+            "162 scored presses stopped when they were felt, at 0.45 mm in the median: the planned depth was not reached",
+        ),
+        (
             json!({"kind": "scheduled"}),
             "press times and positions come from a schedule, not from a measurement",
         ),

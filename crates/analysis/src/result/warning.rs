@@ -220,6 +220,16 @@ pub enum WarningCause {
         /// Looks declared.
         declared: u32,
     },
+    /// Presses did not go to their planned depth.
+    #[error(
+        "{presses} scored presses stopped when they were felt, at {depth_mm:.2} mm in the median: the planned depth was not reached"
+    )]
+    StoppedWhenFelt {
+        /// Number of them.
+        presses: u32,
+        /// Median measured depth, mm.
+        depth_mm: f64,
+    },
     /// Times and positions that nobody measured.
     #[error("press times and positions come from a schedule, not from a measurement")]
     Scheduled,

@@ -260,3 +260,14 @@ pub(crate) struct TakeLookArgs {
     #[arg(long, value_name = "N")]
     pub number: u32,
 }
+
+/// Arguments of `learn-skin`.
+#[derive(Debug, Args)]
+pub(crate) struct LearnSkinArgs {
+    /// The session.
+    pub session: PathBuf,
+
+    /// False alarms per second, at most.
+    #[arg(long, value_name = "HZ")]
+    pub false_alarms: f64,
+}

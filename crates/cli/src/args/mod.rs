@@ -13,8 +13,8 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub(crate) use self::bench::{
-    ControlArgs, DetectArgs, DevicesArgs, JogArgs, NoteArgs, PlanArgs, ResumeArgs, RunArgs,
-    StatusArgs, TakeLookArgs, ViewArgs, WatchArgs,
+    ControlArgs, DetectArgs, DevicesArgs, JogArgs, LearnSkinArgs, NoteArgs, PlanArgs, ResumeArgs,
+    RunArgs, StatusArgs, TakeLookArgs, ViewArgs, WatchArgs,
 };
 pub(crate) use self::challenge::{
     ChallengeArgs, ChallengeCommand, ExamineArgs, MakeArgs, ScoreArgs,
@@ -271,6 +271,10 @@ pub(crate) enum Command {
     /// Look at the data of a campaign that is under way.
     #[command(hide = true)]
     TakeLook(TakeLookArgs),
+
+    /// Learn what a touch is from a session that is under way.
+    #[command(hide = true)]
+    LearnSkin(LearnSkinArgs),
 
     /// Brake the robot's arm if the program that started this one dies.
     #[command(hide = true)]

@@ -31,6 +31,7 @@ use crate::conclusion::conclude;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::looks::LookMode;
 use crate::run::{RunInputs, record};
+use crate::sense::SenseMode;
 use crate::signals::Operator;
 use crate::sink::ReplayExpectations;
 use crate::terminal::Output;
@@ -119,6 +120,7 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
         known,
         faults: &[],
         looks: LookMode::default(),
+        sense: SenseMode::default(),
     };
     let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = record(&intent, &plan, rig, &args.sessions, None, None, &operator)?;

@@ -41,6 +41,7 @@ pub(super) fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[
             start_after_begin: Some(HostDuration(begin.0)),
             approach_speed_mm_s: clearance_mm / span(phases.approach, phases.contact),
             indent_speed_mm_s: press.depth_mm / span(phases.contact, phases.at_depth),
+            react: None,
             hold: HostDuration((phases.retract.0 - phases.at_depth.0 - SETTLE.0).max(0)),
             retract_speed_mm_s: press.depth_mm / span(phases.retract, phases.release),
             marks: Vec::new(),
@@ -70,6 +71,7 @@ pub(super) fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[
         surface_check: None,
         suspend: Suspend::default(),
         stop: None,
+        online: None,
         presses,
         steps,
     }

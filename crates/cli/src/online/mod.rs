@@ -14,8 +14,7 @@ use serde_json::json;
 use skinrig_analysis::{Analysis, SessionInput};
 use skinrig_model::{CameraId, StreamFormat};
 use skinrig_online::{
-    Detection, Estimate, Felt, IdleStatistic, Live, LiveSettings, ThresholdError, TouchModel,
-    Training, learn,
+    Decoders, Detection, Estimate, Felt, Live, SkinModel, StreamSettings, ThresholdError,
 };
 use skinrig_recorder::SessionReader;
 
@@ -31,14 +30,6 @@ use crate::terminal::Output;
 use feed::Feed;
 use offline::Comparison;
 use summary::{Felts, Quantiles, Sighting, words};
-
-/// What was learnt before the replay.
-struct Learnt {
-    training: Training,
-    model: TouchModel,
-    idle: IdleStatistic,
-    threshold: f64,
-}
 
 /// Times of a replay.
 #[derive(Debug, Clone, Serialize)]
@@ -80,21 +71,11 @@ fn taught(error: ThresholdError, session: &Path) -> Failure {
     ))
 }
 
-fn learnt(args: &OnlineArgs, analysis: &Analysis) -> Result<Learnt, Failure> {
+fn learn(args: &OnlineArgs, analysis: &Analysis) -> Result<SkinModel, Failure> {
     let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
     let _phase = Phase::reading("learning", aligned.events.bytes_read());
-    let fail = |e: ThresholdError| taught(e, &args.session);
-    let training = Training::of(analysis).map_err(|e| fail(e.into()))?;
-    let model = learn(&training, &aligned.events).map_err(|e| fail(e.into()))?;
-    let idle =
-        IdleStatistic::measure(&model, &training, &aligned.events, |_, _| true).map_err(fail)?;
-    let threshold = idle.threshold(args.false_alarms);
-    Ok(Learnt {
-        training,
-        model,
-        idle,
-        threshold,
-    })
+    SkinModel::learn(analysis, &aligned.events, args.false_alarms)
+        .map_err(|e| taught(e, &args.session))
 }
 
 /// Waits until the session time that has passed since `start` is due.
@@ -113,21 +94,18 @@ fn replay(
     reader: &SessionReader,
     (analysis, input): (&Analysis, &SessionInput),
     formats: [StreamFormat; 2],
-    learnt: &Learnt,
+    skin: &SkinModel,
     output: Output,
 ) -> Result<Replay, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     on_ctrl_c(move |_| asked.store(true, Ordering::Relaxed)).map_err(Failure::internal)?;
-    let clocks = *learnt.training.clocks();
-    let settings = LiveSettings {
-        threshold: learnt.threshold,
+    let settings = StreamSettings {
         every_us: 5_000,
         from_us: 0,
     };
-    let mut live =
-        Live::new(formats, analysis, &learnt.model, &clocks, settings).map_err(Failure::input)?;
-    let mut feed = Feed::open(reader, clocks).map_err(Failure::session)?;
+    let mut live = Live::new(Decoders::new(formats), skin, settings).map_err(Failure::input)?;
+    let mut feed = Feed::open(reader, *skin.clocks()).map_err(Failure::session)?;
     let mut comparison = Comparison::new(analysis, input).map_err(Failure::input)?;
     let (mut found, mut sightings): (Vec<Detection>, Vec<Sighting>) = (Vec::new(), Vec::new());
     let mut onset_us = 0;
@@ -205,14 +183,14 @@ fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".to_owned(), |v| format!("{v:.digits$}"))
 }
 
-fn print(learnt: &Learnt, stop: StopRule, felts: &Felts, replay: &Replay, rig: &str) {
+fn print(skin: &SkinModel, stop: StopRule, felts: &Felts, replay: &Replay, rig: &str) {
     outln!("rig       {rig}");
     outln!(
         "learnt    {} places, {:.0} idle events/s; threshold {:.1} nats from {:.0} s of idle time",
-        learnt.model.places(),
-        learnt.model.idle_per_s(),
-        learnt.threshold,
-        learnt.idle.seconds()
+        skin.places(),
+        skin.idle_per_s(),
+        skin.threshold(),
+        skin.idle_s()
     );
     outln!(
         "felt      {} of {} scored presses; {} missed, {} during a false alarm",
@@ -244,13 +222,21 @@ fn print(learnt: &Learnt, stop: StopRule, felts: &Felts, replay: &Replay, rig: &
         ("last before the release".to_owned(), &felts.at_end),
     ] {
         outln!(
-            "position  {what}: error median {} mm, p99 {} mm, n {}; its region holds {} of them",
+            "position  {what}: {} ms after the onset, error median {} mm, p99 {} mm, n {}; region {} mm, holds {} of them",
+            number(at.after_onset_ms.median, 0),
             number(at.error_mm.median, 2),
             number(at.error_mm.p99, 2),
             at.error_mm.n,
+            number(at.region_mm.median, 2),
             at.inside
                 .map_or("-".to_owned(), |s| format!("{:.0} %", 100.0 * s))
         );
+    }
+    let (touches, held) = felts.held;
+    if touches > 0 {
+        outln!("regions   hold at every instant in {held} of {touches} touches (95 % stated)");
+    } else {
+        outln!("regions   none: the calibration presses are too few");
     }
     outln!(
         "offline   {} of {} press windows give the bits of the analysis",
@@ -292,9 +278,9 @@ pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
         )));
     }
     let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
-    let learnt = learnt(args, &analysis)?;
+    let skin = learn(args, &analysis)?;
     let both = (&analysis, &aligned.input);
-    let replay = replay(args, &reader, both, header.stream_formats, &learnt, output)?;
+    let replay = replay(args, &reader, both, header.stream_formats, &skin, output)?;
     let felts = Felts::new(
         &analysis,
         &replay.found,
@@ -304,13 +290,13 @@ pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
     );
     if output.json {
         let summary = json!({ "summary": {
-            "rig": header.rig_name, "threshold": learnt.threshold, "places": learnt.model.places(),
+            "rig": header.rig_name, "threshold": skin.threshold(), "places": skin.places(),
             "felt": felts, "speed": replay.speed, "stopped": replay.stopped,
             "windows": replay.compared, "windows_equal_to_analysis": replay.equal,
         }});
         outln!("{summary}");
     } else {
-        print(&learnt, args.stop_at, &felts, &replay, &header.rig_name);
+        print(&skin, args.stop_at, &felts, &replay, &header.rig_name);
     }
     if replay.equal < replay.compared {
         return Err(Failure::internal(format!(

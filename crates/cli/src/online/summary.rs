@@ -18,11 +18,12 @@ pub(super) struct Sighting {
 
 /// True if a press may end here.
 fn is_met(rule: StopRule, sighting: &Sighting) -> bool {
-    let Some(location) = sighting.position.location else {
+    let region = sighting.position.region;
+    if sighting.position.location.is_none() {
         return false;
-    };
+    }
     match rule {
-        StopRule::Region(mm) => location.region.is_some_and(|r| r.semi_axes_mm[0] <= mm),
+        StopRule::Region(mm) => region.is_some_and(|r| r.semi_axes_mm[0] <= mm),
         StopRule::After(ms) => (sighting.host_us - sighting.onset_us) as f64 >= ms * 1e3,
     }
 }
@@ -58,7 +59,9 @@ impl Quantiles {
 pub(super) struct At {
     pub(super) after_onset_ms: Quantiles,
     pub(super) error_mm: Quantiles,
-    /// Share of positions whose stated region holds the truth; `None` without regions.
+    /// Longer semi-axis of the regions, mm.
+    pub(super) region_mm: Quantiles,
+    /// Share of positions whose region holds the truth; `None` without regions.
     pub(super) inside: Option<f64>,
 }
 
@@ -77,6 +80,8 @@ pub(super) struct Felts {
     pub(super) at_stop: At,
     /// The same at the last position before the release.
     pub(super) at_end: At,
+    /// Touches with regions, and those whose regions hold the truth at every instant.
+    pub(super) held: (usize, usize),
 }
 
 impl Felts {
@@ -118,8 +123,24 @@ impl Felts {
             false_alarms_per_s: score.false_alarms_per_s(),
             at_stop: at(analysis, &seen, first),
             at_end: at(analysis, &seen, last),
+            held: held(analysis, &seen),
         }
     }
+}
+
+/// Touches with regions, and those whose regions hold the truth at every instant.
+fn held(analysis: &Analysis, seen: &[(usize, Vec<Sighting>)]) -> (usize, usize) {
+    let inside = |row: &usize, s: &Sighting| {
+        let (truth, at) = (analysis.presses[*row].truth?, s.position.location?.at);
+        let error = [truth.x_mm - at[0], truth.y_mm - at[1]];
+        Some(s.position.region?.reach(error) <= 1.0)
+    };
+    let all = seen.iter().map(|(row, sightings)| {
+        let found: Vec<bool> = sightings.iter().filter_map(|s| inside(row, s)).collect();
+        (!found.is_empty()).then(|| found.iter().all(|inside| *inside))
+    });
+    let all: Vec<bool> = all.flatten().collect();
+    (all.len(), all.iter().filter(|held| **held).count())
 }
 
 fn at(
@@ -127,7 +148,8 @@ fn at(
     seen: &[(usize, Vec<Sighting>)],
     choose: impl Fn(&[Sighting]) -> Option<Sighting>,
 ) -> At {
-    let (mut after, mut errors, mut inside, mut regions) = (Vec::new(), Vec::new(), 0, 0);
+    let (mut after, mut errors, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
+    let mut inside = 0;
     for (row, sightings) in seen {
         let chosen = choose(sightings);
         let located = chosen.and_then(|s| Some((s, s.position.location?)));
@@ -137,14 +159,15 @@ fn at(
         let error = [truth.x_mm - location.at[0], truth.y_mm - location.at[1]];
         after.push((sighting.host_us - sighting.onset_us) as f64 * 1e-3);
         errors.push(error[0].hypot(error[1]));
-        if let Some(region) = location.region {
-            regions += 1;
+        if let Some(region) = sighting.position.region {
+            sizes.push(region.semi_axes_mm[0]);
             inside += usize::from(region.reach(error) <= 1.0);
         }
     }
     At {
         after_onset_ms: Quantiles::of(after),
         error_mm: Quantiles::of(errors),
-        inside: (regions > 0).then(|| f64::from(inside as u32) / f64::from(regions)),
+        inside: (!sizes.is_empty()).then(|| f64::from(inside as u32) / sizes.len() as f64),
+        region_mm: Quantiles::of(sizes),
     }
 }

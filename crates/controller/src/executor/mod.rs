@@ -2,10 +2,11 @@
 //!
 //! Each part owns its state and is private to this module. Each stage of a run adds its methods in its own file: `arming`
 //! (power on), `stream_checks` (preflight), `steps`, `press`, `press_data` and `search` (the plan), `surface` (surface
-//! checks), `look` (a campaign's question), `requests` (the operator), `suspension` (waiting), and `ending` (return to rest).
+//! checks), `look` (a campaign's question), `feel` (touches felt meanwhile), `requests` (the operator), `suspension` (waiting), and `ending` (return to rest).
 
 mod arming;
 mod ending;
+mod feel;
 mod look;
 mod press;
 mod press_data;
@@ -37,6 +38,8 @@ use crate::states::Event;
 use crate::suspend::Suspender;
 use crate::trigger_line::TriggerLine;
 
+use feel::Feeling;
+
 /// The parts of a run. Dropping it before the end of the run brings the rig to rest.
 pub(crate) struct Executor<'a> {
     plan: &'a Plan,
@@ -52,6 +55,7 @@ pub(crate) struct Executor<'a> {
     preflight: PreflightRun,
     suspender: Suspender,
     looks: Box<dyn Looks>,
+    feeling: Feeling,
     /// The first look with an answer.
     answered: Option<Look>,
     /// The look that stops the run.
@@ -68,6 +72,7 @@ impl<'a> Executor<'a> {
             settings,
             preflight,
             looks,
+            sense,
         } = parts;
         let Rig {
             indenter,
@@ -93,6 +98,7 @@ impl<'a> Executor<'a> {
             preflight: PreflightRun::new(preflight),
             suspender: Suspender::new(plan.suspend),
             looks,
+            feeling: Feeling::new(sense),
             answered: None,
             decided: None,
         }
@@ -143,6 +149,7 @@ impl<'a> Executor<'a> {
         self.observe()?;
         self.suspend()?;
         self.take_looks()?;
+        self.feel()?;
         self.handle_requests()
     }
 
@@ -243,6 +250,7 @@ impl<'a> Executor<'a> {
                 press.count(&chunk);
             }
             self.suspender.count(&chunk);
+            self.feeling.complete(&chunk);
             self.preflight.observe(&chunk);
             let timed = match self.cameras.check_time(&chunk) {
                 Ok(Some(late)) => self.journal.note(chunk.host_time, late.to_string()),

@@ -1,6 +1,6 @@
 //! Execution of one press: down to the surface, to depth, hold and back up, with all phase times measured.
 
-use skinrig_model::{HostTime, PressFault, RunFault};
+use skinrig_model::{HostTime, PressFault, Reaction, RunFault};
 use skinrig_protocol::Surface;
 use skinrig_protocol::plan::PressStep;
 
@@ -89,6 +89,7 @@ impl Executor<'_> {
         let at_clearance = step.at.at_height(self.plan.limits.clearance_mm);
         let target = self.indenter.point_above().unwrap_or(at_clearance);
         let up = self.command(target, step.retract_speed_mm_s)?;
+        self.lifted(up)?;
         if let Some(phases) = self.trackers.phases_mut() {
             phases.rise_to(target, up);
         }
@@ -169,15 +170,51 @@ impl Executor<'_> {
         if let Some(phases) = self.trackers.phases_mut() {
             phases.indent_from(t);
         }
-        if !self.until(|t| t.at_depth().is_some(), deadline)? {
-            return Ok(late(self, "indentation", bottom_mm));
+        if let Some(fault) = self.descend(step, t, bottom_mm, deadline)? {
+            return Ok(Some(fault));
         }
         let settled = self.trackers.phases().and_then(PressTracker::at_depth);
         let until = settled.unwrap_or(t) + step.hold;
         while self.now() < until {
             self.tick(Some(until))?;
+            if let Some(touch) = self.reacts(step, Reaction::Lift, t) {
+                self.lift_for(touch);
+                break;
+            }
         }
         Ok(None)
+    }
+
+    /// Waits until the tip has settled at its depth, or where it stopped because the press was felt. `from` is the time of the
+    /// command. Returns the fault if that did not happen in time.
+    fn descend(
+        &mut self,
+        step: &PressStep,
+        from: HostTime,
+        bottom_mm: f64,
+        deadline: HostTime,
+    ) -> Result<Option<PressFault>, Halt> {
+        let mut stopped = false;
+        loop {
+            let phases = self.trackers.phases();
+            if phases.is_some_and(|t| t.at_depth().is_some()) {
+                return Ok(None);
+            }
+            if self.now() >= deadline {
+                let target = step.at.at_height(bottom_mm);
+                let late = self.not_arrived("indentation", target, step.deadline);
+                return Ok(Some(PressFault::MotionLate(late)));
+            }
+            match self.reacts(step, Reaction::Stop, from) {
+                Some(touch) if !stopped => {
+                    stopped = true;
+                    if let Some(fault) = self.stop_here(step, touch, bottom_mm)? {
+                        return Ok(Some(fault));
+                    }
+                }
+                _ => self.tick(Some(deadline))?,
+            }
+        }
     }
 
     /// Ticks until the condition on the tracker holds; false if `deadline` passed first.

@@ -13,6 +13,7 @@ use crate::states::{Action, Event, State};
 impl Executor<'_> {
     /// Everything between arming and the end.
     pub(super) fn steps(&mut self) -> Result<(), Halt> {
+        self.note_without_sense()?;
         self.series.begin(self.now());
         self.safe_point()?;
         self.rise_first()?;
@@ -34,6 +35,7 @@ impl Executor<'_> {
                     deadline,
                 } => self.go(&format!("travel (step {n})"), *to, *speed_mm_s, *deadline)?,
                 Step::Look { number, .. } => self.begin_look(*number)?,
+                Step::Learn => self.begin_learning()?,
                 Step::Press(press) => {
                     self.press(press)?;
                     self.check_surface_after(n)?;

@@ -6,6 +6,7 @@ mod course;
 mod data_faults;
 mod edges;
 mod escape;
+mod felt;
 mod guard;
 mod jog;
 mod looks;

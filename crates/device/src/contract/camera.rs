@@ -3,7 +3,7 @@
 use skinrig_model::{HostDuration, HostTime, RawChunk};
 
 use super::{answered, pass};
-use crate::{CameraSettings, Clock, DeviceError, EventCamera, Roi, TestPattern};
+use crate::{CameraSettings, Clock, DeviceError, EventCamera, OpenChunk, Roi, TestPattern};
 
 /// Verifies the contract of [`EventCamera`]. `make` returns a new, stopped camera and its clock; `settings` are those of the rig.
 pub fn event_camera(
@@ -98,6 +98,7 @@ fn camera_stream(
         .configure(settings)
         .expect("camera: the rig's settings must be accepted");
     let mut all: Vec<RawChunk> = Vec::new();
+    let mut open: Vec<OpenChunk> = Vec::new();
     camera.poll(&mut all).expect("camera: poll while stopped");
     assert!(all.is_empty(), "camera: a stopped camera sends nothing");
     for round in 0..2 {
@@ -105,6 +106,8 @@ fn camera_stream(
         let before = all.len();
         pass(clock.as_mut(), HostDuration::from_millis(300), || {
             camera.poll(&mut all).expect("camera: poll");
+            let from = next_of(&open, all.len() as u64);
+            open.extend(camera.open_chunk(from));
         });
         let at = clock.now();
         answered(clock.as_mut(), || camera.flush(&mut all)).expect("camera: flush");
@@ -127,6 +130,22 @@ fn camera_stream(
         }
     }
     check_chunks(camera.as_ref(), &all, clock.now());
+    for part in &open {
+        let chunk = all.iter().find(|c| c.seq == part.seq);
+        let chunk = chunk.expect("camera: an open chunk must be completed");
+        let same = chunk.bytes.get(part.from..part.from + part.bytes.len());
+        assert!(
+            same == Some(&part.bytes) && chunk.lost_before == part.lost_before,
+            "camera: chunk {} must hold the bytes that it showed while open",
+            part.seq
+        );
+    }
+}
+
+/// Position after the newest bytes of the chunk with this number.
+fn next_of(open: &[OpenChunk], seq: u64) -> usize {
+    let newest = open.last().filter(|part| part.seq == seq);
+    newest.map_or(0, |part| part.from + part.bytes.len())
 }
 
 /// A camera either generates a test pattern and restores its pixels, or rejects it.

@@ -6,7 +6,8 @@ use skinrig_model::{CameraId, DeviceIdentity, DeviceRole, RawChunk, Setting};
 
 use super::{Call, Calls, Timeouts, Worker};
 use crate::{
-    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, PatternScan, TestPattern,
+    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, OpenChunk, PatternScan,
+    TestPattern,
 };
 
 type Device = Box<dyn EventCamera>;
@@ -24,6 +25,7 @@ pub struct DetachedCamera {
     flush: Option<Call<Answer<()>>>,
     temperature: Option<Call<Answer<Option<f64>>>>,
     newest: Option<Call<Option<Vec<u8>>>>,
+    open_chunk: Option<Call<Option<OpenChunk>>>,
     notes: Vec<String>,
 }
 
@@ -51,6 +53,7 @@ impl DetachedCamera {
             flush: None,
             temperature: None,
             newest: None,
+            open_chunk: None,
             notes: Vec::new(),
         })
     }
@@ -152,6 +155,17 @@ impl EventCamera for DetachedCamera {
             let within = self.worker.timeouts.running;
             let call = move |d: &mut Device| d.newest(most);
             self.newest = self.worker.request("newest", within, call).ok();
+        }
+        answer?
+    }
+
+    /// Result of the previous call, once. A device that does not answer fails at the next poll.
+    fn open_chunk(&mut self, from: usize) -> Option<OpenChunk> {
+        let answer = self.worker.answer(&mut self.open_chunk).ok()?;
+        if self.open_chunk.is_none() {
+            let within = self.worker.timeouts.running;
+            let call = move |d: &mut Device| d.open_chunk(from);
+            self.open_chunk = self.worker.request("open chunk", within, call).ok();
         }
         answer?
     }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use skinrig_device::{
-    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, PatternScan, RealClock,
-    SyncMode, TestPattern,
+    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, OpenChunk, PatternScan,
+    RealClock, SyncMode, TestPattern,
 };
 use skinrig_model::{
     CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, RawChunk, SENSOR_HEIGHT,
@@ -557,6 +557,13 @@ impl EventCamera for Evk1 {
 
     fn newest(&mut self, most: usize) -> Option<Vec<u8>> {
         Some(self.stream.as_ref()?.inbox.newest(most))
+    }
+
+    /// None while words have no valid time.
+    fn open_chunk(&mut self, from: usize) -> Option<OpenChunk> {
+        let seq = self.chunker.open_seq()?;
+        let inbox = &self.stream.as_ref()?.inbox;
+        inbox.with_open(|bytes| OpenChunk::of(seq, 0, bytes, from))?
     }
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {

@@ -87,6 +87,11 @@ impl Chunker {
         }
     }
 
+    /// Number of the next chunk; `None` while words have no valid times.
+    pub(crate) fn open_seq(&self) -> Option<u64> {
+        self.time_runs().then_some(self.seq)
+    }
+
     /// Whether words have valid times.
     #[must_use]
     pub fn time_runs(&self) -> bool {

@@ -147,6 +147,13 @@ impl Inbox {
         newest_words(&self.state().open, most)
     }
 
+    /// Looks at the block being filled; `None` if blocks wait before it, or bytes were lost.
+    pub fn with_open<T>(&self, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
+        let state = self.state();
+        let follows = state.ready.is_empty() && state.loss.is_none();
+        follows.then(|| look(&state.open))
+    }
+
     /// Takes everything at the end of a stream; an incomplete word counts as lost.
     #[must_use]
     pub fn finish(&self) -> QueuedData {

@@ -3,7 +3,7 @@
 use std::mem;
 
 use skinrig_device::{
-    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, newest_words,
+    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, OpenChunk, newest_words,
 };
 use skinrig_formats::Scanner;
 use skinrig_model::{
@@ -229,6 +229,11 @@ impl EventCamera for Evt3Camera {
 
     fn newest(&mut self, most: usize) -> Option<Vec<u8>> {
         Some(newest_words(&self.filling.bytes, most))
+    }
+
+    fn open_chunk(&mut self, from: usize) -> Option<OpenChunk> {
+        let filling = &self.filling;
+        OpenChunk::of(filling.seq, filling.lost_before, &filling.bytes, from)
     }
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {

@@ -12,6 +12,7 @@ use super::ranges::{DEPTH_MM, VERSION};
 use super::scene::SceneKeys;
 use crate::design::CalibrateAt;
 use crate::faults::{self, PlantedFault};
+use crate::online::OnlineKeys;
 use crate::protocol::Prototype;
 use crate::retakes::Retakes;
 use crate::stop::StopKeys;
@@ -84,6 +85,8 @@ pub(crate) struct ProtocolKeys {
     pub calibrate_at: Option<CalibrateAt>,
     /// When the campaign ends by itself, before all its repetitions; never when absent.
     pub stop: Option<StopKeys>,
+    /// Touch felt while the session is recorded; nothing is felt when absent.
+    pub online: Option<OnlineKeys>,
     /// Settings of the analysis that follows the run.
     #[setting(default)]
     pub analysis: AnalysisSettings,

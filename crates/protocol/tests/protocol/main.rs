@@ -8,6 +8,7 @@ mod laws;
 mod limits;
 mod missing;
 mod notify;
+mod online;
 mod remaining;
 mod rig;
 mod scene;

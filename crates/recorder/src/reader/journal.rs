@@ -2,7 +2,7 @@
 
 use skinrig_model::{
     BoxReport, CheckKind, CheckVerdict, HostTime, Mark, MarkKind, MotionCommand, Notification,
-    PlannedPress, Point3, PreflightCheck, PressId, PressOutcome, RunEnd, SentMark,
+    PlannedPress, Point3, PreflightCheck, PressId, PressOutcome, RunEnd, SentMark, TouchEstimate,
 };
 
 use super::SessionReader;
@@ -13,6 +13,7 @@ use crate::from_row::{attempt_from, planned_from};
 use crate::notification;
 use crate::query::{self, enum_value, has_table, int, num, opt_text, real, text};
 use crate::rows::{AttemptRow, CommandRow, InterruptionRow, NoteRow};
+use crate::touch;
 
 impl SessionReader {
     /// Every planned press in plan order, each with its attempts in order.
@@ -173,6 +174,19 @@ impl SessionReader {
         }
         let sql = "SELECT * FROM notification ORDER BY id";
         self.query_all(DOING, sql, notification::from_row)
+    }
+
+    /// Touches felt while the session was recorded, in order; empty in sessions before schema 13.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn touches(&self) -> Result<Vec<TouchEstimate>, RecorderError> {
+        const DOING: &str = "reading touches";
+        if !self.query(DOING, async |conn| has_table(conn, "touch").await)? {
+            return Ok(Vec::new());
+        }
+        let sql = "SELECT * FROM touch ORDER BY id";
+        self.query_all(DOING, sql, touch::from_row)
     }
 
     /// Time and kind of the run's end; `None` for a run in progress or a crashed one.

@@ -29,7 +29,7 @@ const fn table(name: &'static str, least: usize, insert: &'static str) -> TableS
 }
 
 /// All tables, parents before children.
-pub(super) const TABLES: [TableSpec; 22] = [
+pub(super) const TABLES: [TableSpec; 23] = [
     table(
         "session",
         20,
@@ -107,6 +107,26 @@ pub(super) const TABLES: [TableSpec; 22] = [
             "notification",
             10,
             "INSERT INTO notification VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )
+    },
+    TableSpec {
+        words: Some((
+            4,
+            &[
+                "started",
+                "onset",
+                "position",
+                "withdrawn",
+                "release",
+                "skipped",
+                "stopped",
+                "lifted",
+            ],
+        )),
+        ..table(
+            "touch",
+            13,
+            "INSERT INTO touch VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )
     },
     table("table_digest", 3, ""),

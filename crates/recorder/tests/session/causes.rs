@@ -180,6 +180,7 @@ fn causes_of_older_sessions_are_their_text() {
                 "ALTER TABLE run_end DROP COLUMN cause",
                 "ALTER TABLE leg DROP COLUMN previous_cause",
                 "DROP TABLE notification",
+                "DROP TABLE touch",
                 "DELETE FROM _sqlx_migrations WHERE version >= 20261125000000",
                 "PRAGMA user_version = 10",
             ],

@@ -220,6 +220,7 @@ pub(crate) fn records(presses: u32) -> Vec<Record> {
         t,
         text: "tip cleaned".into(),
     });
+    out.extend(touches().map(Record::Touch));
     let last = AttemptId {
         press: PressId::from_index(presses - 1),
         number: 1,
@@ -228,6 +229,35 @@ pub(crate) fn records(presses: u32) -> Vec<Record> {
     out.push(Record::Ended { t, end: stopped() });
     out.extend(notifications().map(|n| Record::Notification(Box::new(n))));
     out
+}
+
+/// Touches felt in [`records`]: one with everything, one between presses.
+pub(crate) fn touches() -> [TouchEstimate; 2] {
+    let full = TouchEstimate {
+        t: HostTime(12_345_678),
+        until: HostTime(9_000_000),
+        until_sd_ns: 1_500,
+        kind: TouchKind::Stopped,
+        attempt: Some(AttemptId {
+            press: PressId::from_index(1),
+            number: 1,
+        }),
+        at_mm: Some([1.0 / 3.0, -4.5]),
+        region: Some(TouchRegion {
+            semi_axes_mm: [2.5, 1.0 / 7.0],
+            angle_deg: -31.25,
+        }),
+        llr: Some(12.75),
+    };
+    let skipped = TouchEstimate {
+        kind: TouchKind::Skipped,
+        attempt: None,
+        at_mm: None,
+        region: None,
+        llr: None,
+        ..full
+    };
+    [full, skipped]
 }
 
 /// Messages about the end of [`records`]: one sent, one not.

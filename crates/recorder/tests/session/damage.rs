@@ -25,6 +25,7 @@ fn read_all(path: &Path) {
         reader.commands(),
         reader.notes(),
         reader.notifications(),
+        reader.touches(),
         reader.interruptions(),
         reader.end(),
         reader.totals(),

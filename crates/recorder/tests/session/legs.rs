@@ -341,6 +341,7 @@ fn check_older_schema(was_sealed: bool) {
                 "DROP TABLE leg",
                 "DROP TABLE gap",
                 "DROP TABLE notification",
+                "DROP TABLE touch",
                 "ALTER TABLE attempt DROP COLUMN leg",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
                 "ALTER TABLE attempt DROP COLUMN faults",

@@ -18,6 +18,7 @@ fn read_everything(path: &Path) -> Result<(), RecorderError> {
     reader.totals()?;
     reader.notes()?;
     reader.notifications()?;
+    reader.touches()?;
     reader.interruptions()?;
     reader.seal()?;
     reader.for_each_pose_block(HostTime(i64::MIN), HostTime(i64::MAX), |_| ())?;

@@ -136,6 +136,7 @@ fn all_records_round_trip() {
     assert_eq!(reports.len(), 30);
     assert_eq!(reader.box_reports().unwrap(), reports);
     assert_eq!(reader.notes().unwrap()[0].text, "tip cleaned");
+    assert_eq!(reader.touches().unwrap(), crate::common::touches());
     assert_eq!(
         reader.notifications().unwrap(),
         crate::common::notifications()

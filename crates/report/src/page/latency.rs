@@ -1,6 +1,7 @@
 //! Owns the tables of the detection-latency study.
 
-use skinrig_analysis::result::{Analysis, Estimate, Latency};
+use skinrig_analysis::result::{Analysis, Estimate, FeltTouches, Latency, Spread};
+use skinrig_model::Reaction;
 
 use super::cells::estimate;
 use crate::document::Table;
@@ -82,6 +83,89 @@ pub(super) fn latency(a: &Analysis) -> Option<Table> {
     notes(&mut grid, l);
     grid.download("latency_sweep");
     Some(grid)
+}
+
+/// Touches felt while the session was recorded.
+pub(super) fn felt(a: &Analysis) -> Option<Table> {
+    let f = a.felt.as_ref()?;
+    let mut grid = Table::new(
+        "felt-table",
+        "Felt while recording",
+        &["Quantity", "#Median", "#99th percentile", "#n"],
+    );
+    let mut row = |name: &str, s: &Spread, digits: usize| {
+        let value = |v: Option<f64>| number(v, digits);
+        grid.row([
+            name.to_owned(),
+            value(s.median),
+            value(s.p99),
+            s.n.to_string(),
+        ]);
+    };
+    row("contact to felt (ms)", &f.delay_ms, 1);
+    row("last event to estimate (ms)", &f.lag_ms, 1);
+    row("error before the release (mm)", &f.error_mm, 2);
+    row("longer semi-axis of its region (mm)", &f.region_mm, 2);
+    if let Some(r) = &f.reactions {
+        row("contact to new set point (ms)", &r.reaction_ms, 1);
+        row("last event to new set point (ms)", &r.since_event_ms, 1);
+        row("depth reached (mm)", &r.depth_mm, 2);
+    }
+    for text in felt_notes(f) {
+        grid.note(text);
+    }
+    Some(grid)
+}
+
+fn felt_notes(f: &FeltTouches) -> Vec<String> {
+    let mut notes = vec![format!(
+        "{} of {} scored presses felt, {} missed, {} during a false alarm; {} false alarms in {} s without contact.",
+        f.felt,
+        f.presses,
+        f.missed,
+        f.alarmed,
+        f.false_alarms,
+        number(Some(f.at_risk_s), 0)
+    )];
+    if f.before > 0 {
+        notes.push(format!(
+            "{} scored presses came before touches were felt, {} s into the session.",
+            f.before,
+            number(Some(f.from_s), 0)
+        ));
+    }
+    notes.push(if f.with_regions > 0 {
+        format!(
+            "The regions hold at every instant in {} of {} touches; at least 95 % are stated.",
+            f.held, f.with_regions
+        )
+    } else {
+        "No regions: the calibration presses are too few.".to_owned()
+    });
+    if let Some(r) = &f.reactions {
+        let what = match r.reaction {
+            Reaction::Stop => "stopped where they were",
+            Reaction::Lift => "ended their hold",
+        };
+        let mut text = format!("{} presses {what} when they were felt", r.reaction_ms.n);
+        if r.regions.0 > 0 {
+            text += &format!(
+                "; the region held the measured position in {} of {}",
+                r.regions.1, r.regions.0
+            );
+        }
+        if !r.early.is_empty() {
+            text += &format!("; {} reacted before contact", r.early.len());
+        }
+        notes.push(text + ".");
+    }
+    if f.skipped > 0 {
+        notes.push(format!(
+            "The estimator could not keep up {} times; nothing recorded was lost.",
+            f.skipped
+        ));
+    }
+    notes
 }
 
 fn notes(grid: &mut Table, l: &Latency) {

@@ -242,9 +242,10 @@ fn data_reduction(input: &ReportInput<'_>) -> Section {
 fn detection(input: &ReportInput<'_>) -> Section {
     let a = input.analysis;
     let section = Section::new("detection", "Detection latency");
+    let felt = card(a, latency::felt(a)).map(|card| Group::two().with(card));
     let Some(table) = card(a, latency::latency(a)) else {
         let why = "The latency study was not run: the settings disable it, or no scored press has events.";
-        return section.with(missing("", why));
+        return section.with_all(felt).with(missing("", why));
     };
     let from_contact = card(a, latency::from_contact(a)).map(Block::from);
     let from_contact = from_contact.unwrap_or_else(|| {
@@ -259,6 +260,7 @@ fn detection(input: &ReportInput<'_>) -> Section {
         .with_all(figures::latency_course(input))
         .with(curves)
         .with(Group::two().with(table).with(from_contact))
+        .with_all(felt)
 }
 
 fn rates(a: &Analysis) -> Option<Section> {

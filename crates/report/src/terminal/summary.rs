@@ -1,6 +1,7 @@
 //! Owns the summary that ends a command: the answer first, at most [`MAX_LINES`] lines; the page and the table have the rest.
 
 use skinrig_analysis::result::Analysis;
+use skinrig_model::Reaction;
 use skinrig_text::Paint;
 
 use crate::derive;
@@ -73,6 +74,7 @@ fn head(input: &ReportInput<'_>) -> Vec<Note> {
     });
     if a.is_valid() {
         notes.extend(line(a).map(|text| Note::new("depth", text)));
+        notes.extend(felt(a).map(|text| Note::new("felt", text)));
     }
     if let Some(variant) = &p.variant {
         notes.push(Note::new("VARIANT", variant.to_string()).warning());
@@ -93,6 +95,26 @@ fn head(input: &ReportInput<'_>) -> Vec<Note> {
         .into_iter()
         .map(|note| note.at_most(MAX_REMARK))
         .collect()
+}
+
+/// Touches felt while the session was recorded.
+fn felt(a: &Analysis) -> Option<String> {
+    let f = a.felt.as_ref()?;
+    let mut text = format!(
+        "{} of {} scored presses while recording, {} ms after contact",
+        f.felt,
+        f.presses,
+        number(f.delay_ms.median, 1)
+    );
+    if let Some(r) = &f.reactions {
+        let what = match r.reaction {
+            Reaction::Stop => "stopped",
+            Reaction::Lift => "lifted",
+        };
+        let (n, ms) = (r.reaction_ms.n, number(r.reaction_ms.median, 1));
+        text += &format!("; {n} {what} after {ms} ms");
+    }
+    Some(text)
 }
 
 /// All that qualifies the answer, the gravest first; each a few lines.

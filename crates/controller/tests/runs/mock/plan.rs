@@ -34,6 +34,7 @@ pub(crate) fn plan() -> Plan {
             start_after_begin: Some(HostDuration::from_millis(300 + 503 * i as i64)),
             approach_speed_mm_s: 50.0,
             indent_speed_mm_s: 20.0,
+            react: None,
             hold: HostDuration::from_millis(30),
             retract_speed_mm_s: 70.0,
             marks: vec![MarkKind::Contact, MarkKind::AtDepth, MarkKind::Release],
@@ -54,6 +55,7 @@ pub(crate) fn plan() -> Plan {
         surface_check: None,
         suspend: Suspend::default(),
         stop: None,
+        online: None,
         presses,
         steps,
     }

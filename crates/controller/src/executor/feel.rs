@@ -1,0 +1,218 @@
+//! Touches felt while the run records: feeds the sense, records its answers, and lets a press react to them.
+
+use skinrig_model::{
+    CameraId, HostTime, PressFault, RawChunk, Reaction, Record, RunFault, TouchEstimate, TouchKind,
+};
+use skinrig_protocol::React;
+use skinrig_protocol::plan::{PressStep, Step};
+
+use super::Executor;
+use crate::error::Halt;
+use crate::open_press::OpenPress;
+use crate::touch_sense::{Fed, SenseAnswer, SensedTouch, TouchSense};
+
+/// The sense, what it has of each stream, and the touch that it feels.
+pub(super) struct Feeling {
+    sense: Box<dyn TouchSense>,
+    fed: [Fed; 2],
+    /// Set once learning has begun: nobody needs the newest bytes before.
+    learning: bool,
+    touch: Option<FeltTouch>,
+    /// Touch for which the tip is about to be lifted.
+    lifting: Option<SensedTouch>,
+}
+
+/// The touch that is felt.
+#[derive(Clone, Copy)]
+struct FeltTouch {
+    /// Time of its onset.
+    onset: HostTime,
+    /// Its onset or newest position.
+    newest: SensedTouch,
+}
+
+impl Feeling {
+    pub(super) fn new(sense: Box<dyn TouchSense>) -> Self {
+        Self {
+            sense,
+            fed: [Fed::default(); 2],
+            learning: false,
+            touch: None,
+            lifting: None,
+        }
+    }
+
+    /// Feeds a complete chunk.
+    pub(super) fn complete(&mut self, chunk: &RawChunk) {
+        if self.sense.is_on() {
+            self.fed[chunk.camera.index()].complete(chunk, self.sense.as_mut());
+        }
+    }
+
+    fn felt(&mut self, touch: SensedTouch) {
+        self.touch = match (touch.kind, self.touch) {
+            (TouchKind::Onset, _) => Some(FeltTouch {
+                onset: touch.until,
+                newest: touch,
+            }),
+            (TouchKind::Position, Some(felt)) => Some(FeltTouch {
+                newest: touch,
+                ..felt
+            }),
+            _ => None,
+        };
+    }
+
+    /// The touch that fulfils `react`, if one is felt that began after `since`: an older one is none of this press.
+    fn fulfilled(&self, react: React, since: HostTime) -> Option<SensedTouch> {
+        let touch = self.touch.filter(|t| t.onset > since)?.newest;
+        let within = |most: f64| touch.region.is_some_and(|r| r.semi_axes_mm[0] <= most);
+        react.region_mm.is_none_or(within).then_some(touch)
+    }
+}
+
+impl Executor<'_> {
+    /// Learning is due. A leg that starts in the middle of the plan has no such step.
+    pub(super) fn begin_learning(&mut self) -> Result<(), RunFault> {
+        if !self.feeling.sense.is_on() {
+            let text = "touches are not felt: nothing feels them in a resumed or library run";
+            return self.journal.note(self.now(), text.to_owned());
+        }
+        self.feeling.learning = true;
+        self.feeling.sense.learn();
+        self.take_answers()
+    }
+
+    /// Says at the start of a leg if nothing will be felt in it although the plan wants it.
+    pub(super) fn note_without_sense(&mut self) -> Result<(), RunFault> {
+        let mut steps = self.plan.steps.iter();
+        if self.plan.online.is_none() || steps.any(|step| matches!(step, Step::Learn)) {
+            return Ok(());
+        }
+        let text =
+            "touches are not felt in this leg: it does not repeat the presses that teach them";
+        self.journal.note(self.now(), text.to_owned())
+    }
+
+    /// Feeds the newest bytes and records what is felt.
+    pub(super) fn feel(&mut self) -> Result<(), RunFault> {
+        if !self.feeling.sense.is_on() {
+            return Ok(());
+        }
+        if self.feeling.learning {
+            for camera in CameraId::ALL {
+                let fed = &mut self.feeling.fed[camera.index()];
+                if let Some(open) = self.cameras.open_chunk(camera, fed.next()) {
+                    fed.open(camera, &open, self.feeling.sense.as_mut());
+                }
+            }
+        }
+        self.take_answers()
+    }
+
+    fn take_answers(&mut self) -> Result<(), RunFault> {
+        let t = self.now();
+        while let Some(answer) = self.feeling.sense.poll(t) {
+            match answer {
+                SenseAnswer::Ready {
+                    places,
+                    has_regions,
+                } => {
+                    let regions = if has_regions {
+                        ""
+                    } else {
+                        "; positions have no regions: the calibrating presses are too few"
+                    };
+                    let text =
+                        format!("touches are felt from now on, learnt at {places} places{regions}");
+                    self.journal.note(t, text)?;
+                    self.record_touch(t, SensedTouch::started(t))?;
+                }
+                SenseAnswer::Off(fault) => {
+                    self.feeling.touch = None;
+                    self.journal
+                        .note(t, format!("touches are not felt: {fault}"))?;
+                }
+                SenseAnswer::Felt(touch) => {
+                    self.feeling.felt(touch);
+                    self.record_touch(t, touch)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn record_touch(&mut self, t: HostTime, touch: SensedTouch) -> Result<(), RunFault> {
+        let attempt = self.trackers.press().map(OpenPress::attempt);
+        let SensedTouch {
+            until,
+            until_sd_ns,
+            kind,
+            at_mm,
+            region,
+            llr,
+        } = touch;
+        self.journal.emit(Record::Touch(TouchEstimate {
+            t,
+            until,
+            until_sd_ns,
+            kind,
+            attempt,
+            at_mm,
+            region,
+            llr,
+        }))
+    }
+
+    /// The touch to which the press reacts now with `then`, if it does so and feels one that began after `since`.
+    pub(super) fn reacts(
+        &self,
+        step: &PressStep,
+        then: Reaction,
+        since: HostTime,
+    ) -> Option<SensedTouch> {
+        let react = step.react.filter(|react| react.then == then)?;
+        self.feeling.fulfilled(react, since)
+    }
+
+    /// Stops the tip where it is, in contact, because of `touch`: never deeper than planned. Returns the fault if that did not
+    /// happen in time.
+    pub(super) fn stop_here(
+        &mut self,
+        step: &PressStep,
+        touch: SensedTouch,
+        bottom_mm: f64,
+    ) -> Result<Option<PressFault>, Halt> {
+        let Some(found) = self.indenter.position() else {
+            return Ok(None);
+        };
+        let surface_mm = bottom_mm + step.depth_mm;
+        let target = step
+            .at
+            .at_height(found.measured.z_mm.clamp(bottom_mm, surface_mm));
+        let t = match self.command_when_steady(target, step.indent_speed_mm_s)? {
+            Ok(t) => t,
+            Err(off_target) => return Ok(Some(off_target.fault())),
+        };
+        let kind = Reaction::Stop.kind();
+        self.record_touch(t, SensedTouch { kind, ..touch })?;
+        if let Some(phases) = self.trackers.phases_mut() {
+            phases.stop_at(target.z_mm, t);
+        }
+        Ok(None)
+    }
+
+    /// The tip will be lifted because of `touch`.
+    pub(super) fn lift_for(&mut self, touch: SensedTouch) {
+        self.feeling.lifting = Some(touch);
+    }
+
+    /// Records that the robot accepted at `t` to rise, if a touch was the reason.
+    pub(super) fn lifted(&mut self, t: HostTime) -> Result<(), RunFault> {
+        let Some(touch) = self.feeling.lifting.take() else {
+            return Ok(());
+        };
+        let kind = Reaction::Lift.kind();
+        self.record_touch(t, SensedTouch { kind, ..touch })
+    }
+}

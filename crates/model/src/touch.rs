@@ -1,0 +1,92 @@
+//! Touches felt while a session is recorded.
+
+use serde::{Deserialize, Serialize};
+use skinrig_settings::Choice;
+
+use crate::id::AttemptId;
+use crate::time::HostTime;
+
+/// What was felt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Choice)]
+#[serde(rename_all = "snake_case")]
+pub enum TouchKind {
+    /// Touches are felt from now on.
+    Started,
+    /// A touch began.
+    Onset,
+    /// Where it is by now.
+    Position,
+    /// It was none.
+    Withdrawn,
+    /// It ended.
+    Release,
+    /// Bytes were skipped because the estimator could not keep up; it starts again on an idle skin.
+    Skipped,
+    /// The press stopped where it was: `t` is the time at which the robot had accepted the new set point.
+    Stopped,
+    /// The press ended its hold: the same.
+    Lifted,
+}
+
+impl TouchKind {
+    /// All kinds.
+    pub const ALL: &[Self] = <Self as Choice>::ALL;
+
+    /// The name used in sessions: `onset`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.word()
+    }
+}
+
+/// A 95 % region of a position: an ellipse about it that holds at every instant of the touch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TouchRegion {
+    /// Semi-axes, mm, the longer first; positive.
+    pub semi_axes_mm: [f64; 2],
+    /// Direction of the longer one, degrees from the x axis, counter-clockwise.
+    pub angle_deg: f64,
+}
+
+/// An estimate made while the session was recorded, or the reaction of a press to it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TouchEstimate {
+    /// Time at which the run had it.
+    pub t: HostTime,
+    /// Events up to this time are in it, by the clock fits of the estimator.
+    pub until: HostTime,
+    /// Standard deviation of `until` by those fits, ns.
+    pub until_sd_ns: i64,
+    /// What was felt.
+    pub kind: TouchKind,
+    /// Attempt under way at `t`; `None` between presses.
+    pub attempt: Option<AttemptId>,
+    /// Position, mm; of an onset, the most likely place learnt; `None` without one.
+    pub at_mm: Option<[f64; 2]>,
+    /// Its region; `None` if the calibration presses do not determine it.
+    pub region: Option<TouchRegion>,
+    /// Log likelihood ratio of an onset against the background, nats.
+    pub llr: Option<f64>,
+}
+
+/// What a press does when a touch is felt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
+#[serde(rename_all = "snake_case")]
+pub enum Reaction {
+    /// Stops where it is and holds there, instead of going on to its depth.
+    #[default]
+    Stop,
+    /// Ends its hold.
+    Lift,
+}
+
+impl Reaction {
+    /// Its record.
+    #[must_use]
+    pub const fn kind(self) -> TouchKind {
+        match self {
+            Self::Stop => TouchKind::Stopped,
+            Self::Lift => TouchKind::Lifted,
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! Regions that hold at every instant of a touch: how far positions still move until it ends, learnt from calibration presses.
+//!
+//! At an instant, the position that the touch will end with lies within `reach` of the position so far, with probability
+//! [`STAYS`], at all instants together: `reach` is a multiple of a typical distance after so many clustered events in the weaker
+//! camera, and the multiple is the conformal quantile, over presses, of the largest ratio that a press has at any instant (Vovk,
+//! Gammerman & Shafer, "Algorithmic Learning in a Random World", 2005, chapter 2; each half of the presses is scored with the
+//! typical distances of the other). Events, not time, tell how far a touch has come: a press that stops early stays uncertain. The
+//! last position lies with probability 0.99 in the 99 % region of its locator. Both together hold with 95 %, whenever one stops.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use serde::{Deserialize, Serialize};
+use skinrig_analysis::EventSource;
+use skinrig_analysis::result::Region;
+use skinrig_model::CameraId;
+
+use crate::detector::Felt;
+use crate::interleave::interleave;
+use crate::skin_model::SkinModel;
+use crate::stream::{Estimate, StreamSettings, TouchStream};
+use crate::threshold::ThresholdError;
+use crate::training::{MARGIN_US, Training};
+
+/// Probability that the last position stays within reach at every instant.
+const STAYS: f64 = 0.96;
+/// Host time between two positions of a calibration press, µs.
+const EVERY_US: i64 = 5_000;
+/// Steps per doubling of the events.
+const STEPS_PER_OCTAVE: f64 = 4.0;
+/// Quantile of the distances in a step that is typical there.
+const TYPICAL: f64 = 1.0;
+/// Smallest typical distance, mm: below what any skin resolves.
+const LEAST_MM: f64 = 0.02;
+
+/// Positions of one calibration press: clustered events in the weaker camera, and position, mm; in order of time.
+pub(crate) type Course = Vec<(u32, [f64; 2])>;
+
+/// How far positions still move.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Settling {
+    /// Typical distance to the last position by step of events, mm; falls with them.
+    typical_mm: Vec<f64>,
+    /// Multiple of it that holds at all instants.
+    multiple: f64,
+    /// Presses behind it, for display.
+    presses: usize,
+}
+
+fn step(events: u32) -> usize {
+    (STEPS_PER_OCTAVE * libm::log2(f64::from(events) + 1.0)) as usize
+}
+
+/// Distance to the last position at each instant, by step of events.
+fn distances(course: &Course) -> Vec<(usize, f64)> {
+    let Some((_, last)) = course.last() else {
+        return Vec::new();
+    };
+    let distance = |at: [f64; 2]| libm::hypot(at[0] - last[0], at[1] - last[1]);
+    course
+        .iter()
+        .map(|(events, at)| (step(*events), distance(*at)))
+        .collect()
+}
+
+/// Typical distances of these presses; none without presses.
+fn typical(presses: &[&Vec<(usize, f64)>]) -> Vec<f64> {
+    let steps = presses.iter().flat_map(|p| p.iter()).map(|(s, _)| s + 1);
+    let mut typical: Vec<f64> = Vec::new();
+    for at in 0..steps.max().unwrap_or(0) {
+        // The largest distance of each press, so that one that stays long in a step counts once.
+        let largest = |press: &&Vec<(usize, f64)>| {
+            let here = press.iter().filter(|(s, _)| *s == at).map(|(_, d)| *d);
+            here.fold(None, |most: Option<f64>, d| {
+                Some(most.map_or(d, |m| m.max(d)))
+            })
+        };
+        let mut here: Vec<f64> = presses.iter().filter_map(largest).collect();
+        here.sort_by(f64::total_cmp);
+        let rank = (TYPICAL * here.len() as f64) as usize;
+        let value = here.get(rank.min(here.len().saturating_sub(1)));
+        typical.push(value.copied().unwrap_or(0.0).max(LEAST_MM));
+    }
+    // More events are no less certain; a step that was not seen counts as the one with more.
+    for at in (1..typical.len()).rev() {
+        typical[at - 1] = typical[at - 1].max(typical[at]);
+    }
+    typical
+}
+
+fn at_step(typical: &[f64], step: usize) -> f64 {
+    typical
+        .get(step)
+        .or(typical.last())
+        .copied()
+        .unwrap_or(f64::INFINITY)
+}
+
+/// A course under way.
+#[derive(Default)]
+struct Courses {
+    /// Onset, host µs, and course.
+    ended: Vec<(i64, Course)>,
+    open: Option<(i64, Course)>,
+}
+
+impl Courses {
+    fn add(&mut self, estimate: Estimate) {
+        match estimate {
+            Estimate::Felt(d) => {
+                self.ended.extend(self.open.take());
+                self.open = (d.felt == Felt::Onset).then(|| (d.host_us, Course::new()));
+            }
+            Estimate::Position { position, .. } => {
+                if let (Some((_, course)), Some(at)) = (&mut self.open, position.location) {
+                    course.push((position.clustered, at.at));
+                }
+            }
+        }
+    }
+}
+
+impl Settling {
+    /// Feels and locates the calibration presses as they will be later; `None` if they are too few for regions.
+    ///
+    /// # Errors
+    /// [`ThresholdError`] if the events cannot be read or the cameras have no common time.
+    pub(crate) fn measure(
+        skin: &SkinModel,
+        training: &Training,
+        source: &dyn EventSource,
+    ) -> Result<Option<Self>, ThresholdError> {
+        let settings = StreamSettings {
+            every_us: EVERY_US,
+            from_us: 0,
+        };
+        let mut stream = TouchStream::new(skin, settings)?;
+        let mut courses = Courses::default();
+        let end_us = (training.end_us() + 10.0 * MARGIN_US) as i64;
+        interleave(source, &training.clocks, |camera, events, next_us| {
+            let mut add = |estimate| courses.add(estimate);
+            for camera in CameraId::ALL {
+                let reached = Some(next_us[camera.index()]);
+                let promised = stream.push(camera, &[], reached, &mut add);
+                debug_assert!(promised.is_ok(), "no events, so none that are too many");
+            }
+            stream.push(camera, events, None, &mut add).is_ok()
+                && stream.detector().now_us() < end_us
+        })?;
+        stream.finish(|estimate| courses.add(estimate));
+        courses.ended.extend(courses.open);
+        let felt = courses.ended;
+        let of_press = |contact_us: f64, release_us: f64| {
+            let during = contact_us - MARGIN_US..release_us;
+            felt.iter()
+                .find(|(onset_us, _)| during.contains(&(*onset_us as f64)))
+        };
+        let presses = training.presses.iter();
+        let own: Vec<Course> = presses
+            .filter_map(|p| Some(of_press(p.contact_us, p.release_us)?.1.clone()))
+            .collect();
+        Ok(Self::learn(&own))
+    }
+
+    /// From the positions of calibration presses; `None` if they are too few for this probability.
+    pub(crate) fn learn(courses: &[Course]) -> Option<Self> {
+        let presses: Vec<_> = courses.iter().map(distances).collect();
+        let presses: Vec<_> = presses.into_iter().filter(|p| !p.is_empty()).collect();
+        let half = |odd: usize| -> Vec<&Vec<(usize, f64)>> {
+            presses.iter().skip(odd).step_by(2).collect()
+        };
+        let mut ratios = Vec::new();
+        for odd in [0, 1] {
+            let of_others = typical(&half(1 - odd));
+            for press in half(odd) {
+                let ratio = |(step, distance): &(usize, f64)| distance / at_step(&of_others, *step);
+                ratios.push(press.iter().map(ratio).fold(0.0, f64::max));
+            }
+        }
+        ratios.sort_by(f64::total_cmp);
+        let rank = ((presses.len() as f64 + 1.0) * STAYS).ceil() as usize;
+        Some(Self {
+            multiple: *ratios.get(rank.checked_sub(1)?)?,
+            typical_mm: typical(&presses.iter().collect::<Vec<_>>()),
+            presses: presses.len(),
+        })
+    }
+
+    /// Distance from the position after so many events within which the last one of the touch lies, mm.
+    fn reach_mm(&self, events: u32) -> f64 {
+        self.multiple * at_step(&self.typical_mm, step(events))
+    }
+
+    /// The region of a position after so many events: an ellipse that holds every point within reach of the region of the last position.
+    ///
+    /// Of two ellipses with shape matrices P and Q, (1 + 1/b) P + (1 + b) Q holds every sum (Schweppe 1973, "Uncertain Dynamic
+    /// Systems", section 4.3); b is the ratio of their sizes.
+    pub(crate) fn region(&self, last: Region, events: u32) -> Option<Region> {
+        let reach = self.reach_mm(events);
+        let [a, b] = last.semi_axes_mm;
+        let size = FRAC_1_SQRT_2 * libm::hypot(a, b);
+        let sum = |axis: f64| {
+            libm::sqrt(axis * axis * (1.0 + reach / size) + reach * reach + reach * size)
+        };
+        let region = Region {
+            semi_axes_mm: [sum(a), sum(b)],
+            ..last
+        };
+        let usable = size > 0.0 && region.semi_axes_mm.iter().all(|s| s.is_finite());
+        usable.then_some(region)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use skinrig_statistics::seeded;
+
+    use super::*;
+
+    fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+        (0..12).map(|_| 0.5 * seeded::signed_unit(rng)).sum()
+    }
+
+    /// A touch of 200 ms whose position walks, ever less, to its last one; one in five is as weak as its scatter is large.
+    fn course(rng: &mut Xoshiro256PlusPlus) -> Course {
+        let weak = if seeded::index(rng, 5) == 0 { 4.0 } else { 1.0 };
+        let mut at = [0.0, 0.0];
+        let steps = 30 + seeded::index(rng, 20) as u32;
+        (0..steps)
+            .map(|i| {
+                let scatter = weak / (1.0 + f64::from(i));
+                at = at.map(|v| v + scatter * normal(rng));
+                (20 * i * i, at)
+            })
+            .collect()
+    }
+
+    /// Share of new touches that stay within reach at every instant, over `rounds` sets of `presses` calibration presses.
+    fn coverage(presses: usize, rounds: u64) -> f64 {
+        let (mut within, mut all) = (0, 0);
+        for round in 0..rounds {
+            let mut rng = seeded::generator(round, 3);
+            let courses: Vec<Course> = (0..presses).map(|_| course(&mut rng)).collect();
+            let settling = Settling::learn(&courses).unwrap();
+            for _ in 0..40 {
+                let new = course(&mut rng);
+                let (_, last) = new[new.len() - 1];
+                let stays = |(events, at): &(u32, [f64; 2])| {
+                    libm::hypot(at[0] - last[0], at[1] - last[1]) <= settling.reach_mm(*events)
+                };
+                within += u32::from(new.iter().all(stays));
+                all += 1;
+            }
+        }
+        f64::from(within) / f64::from(all)
+    }
+
+    #[test]
+    fn the_last_position_stays_within_reach_at_every_instant() {
+        for presses in [24, 81, 250] {
+            let share = coverage(presses, 100);
+            assert!(share > STAYS - 0.01 && share < 0.995, "{presses}: {share}");
+        }
+    }
+
+    #[test]
+    fn too_few_presses_give_no_region() {
+        let mut rng = seeded::generator(1, 3);
+        let courses: Vec<Course> = (0..24).map(|_| course(&mut rng)).collect();
+        assert!(Settling::learn(&courses).is_some());
+        assert_eq!(Settling::learn(&courses[..23]), None);
+        assert_eq!(Settling::learn(&[]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn a_region_holds_every_sum(
+            a in 0.01..20.0, b in 0.01..20.0, angle_deg in -90.0..90.0, reach in 0.0..20.0,
+            at in 0.0..6.3, to in 0.0..6.3,
+        ) {
+            let (a, b) = if a > b { (a, b) } else { (b, a) };
+            let last = Region { semi_axes_mm: [a, b], angle_deg };
+            let settling = Settling { typical_mm: vec![reach], multiple: 1.0, presses: 99 };
+            let region = settling.region(last, 0).unwrap();
+            let (sin, cos) = libm::sincos(f64::to_radians(angle_deg));
+            let (y, x): (f64, f64) = libm::sincos(at);
+            let (x, y) = (a * x, b * y);
+            let (dy, dx) = libm::sincos(to);
+            let point = [x * cos - y * sin + reach * dx, x * sin + y * cos + reach * dy];
+            prop_assert!(region.reach(point) <= 1.0 + 1e-9, "{}", region.reach(point));
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Everything that calibration presses teach about a skin, for the process that feels it: a plain value.
+
+use serde::{Deserialize, Serialize};
+use skinrig_analysis::locator::{FittedLocator, LocatorModelError};
+use skinrig_analysis::result::{ClockFit, LocatorResult};
+use skinrig_analysis::{Analysis, EventSource};
+use skinrig_model::{AnalysisSettings, SkinOutline, StereoGeometry};
+
+use crate::learn::learn;
+use crate::model::TouchModel;
+use crate::position::PositionEstimator;
+use crate::settling::Settling;
+use crate::threshold::{IdleStatistic, ThresholdError};
+use crate::training::Training;
+
+/// What was learnt from the calibration presses of a session.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SkinModel {
+    pub(crate) settings: AnalysisSettings,
+    outline: SkinOutline,
+    geometry: StereoGeometry,
+    locator: Option<LocatorResult>,
+    /// Clock of each camera.
+    pub(crate) clocks: [ClockFit; 2],
+    pub(crate) touches: TouchModel,
+    /// Threshold of the detector, nats.
+    pub(crate) threshold: f64,
+    /// How far positions still move; `None` if the presses are too few for regions.
+    pub(crate) settling: Option<Settling>,
+    /// Idle time behind the threshold, s.
+    idle_s: f64,
+    /// Middle of the presses behind the clock fits, host µs.
+    clocks_at_us: f64,
+}
+
+impl SkinModel {
+    /// Learns from the calibration presses of an analysis, whose events are `source`, for at most this many false alarms per second
+    /// (above 0).
+    ///
+    /// # Errors
+    /// [`ThresholdError`]: too few calibration presses or too little idle time, no common time, or unreadable events.
+    pub fn learn(
+        analysis: &Analysis,
+        source: &dyn EventSource,
+        false_alarms_per_s: f64,
+    ) -> Result<Self, ThresholdError> {
+        let training = Training::of(analysis)?;
+        let touches = learn(&training, source)?;
+        let idle = IdleStatistic::measure(&touches, &training, source, |_, _| true)?;
+        let mut skin = Self {
+            settings: analysis.settings.clone(),
+            outline: analysis.rig.outline,
+            geometry: analysis.geometry,
+            locator: analysis.locator.clone(),
+            clocks: *training.clocks(),
+            threshold: idle.threshold(false_alarms_per_s),
+            settling: None,
+            idle_s: idle.seconds(),
+            clocks_at_us: training.middle_us(),
+            touches,
+        };
+        skin.settling = Settling::measure(&skin, &training, source)?;
+        Ok(skin)
+    }
+
+    pub(crate) fn positions(&self) -> Result<PositionEstimator, LocatorModelError> {
+        let locator = FittedLocator::restored(self.locator.as_ref(), self.geometry)?;
+        Ok(PositionEstimator::with(
+            &self.settings,
+            locator,
+            self.outline,
+        ))
+    }
+
+    /// Clock fit of each camera.
+    #[must_use]
+    pub const fn clocks(&self) -> &[ClockFit; 2] {
+        &self.clocks
+    }
+
+    /// Standard deviation of host times made from the cameras', at this host time, µs: of the fits' offsets, and of their rates with
+    /// the time since the presses behind them; the worse camera counts.
+    #[must_use]
+    pub fn time_sd_us(&self, at_us: f64) -> f64 {
+        let of = |fit: &ClockFit| {
+            let offset = fit.residual_rms_us / libm::sqrt(fit.n.max(1) as f64);
+            libm::hypot(
+                offset,
+                1e-6 * fit.drift_se_ppm * (at_us - self.clocks_at_us),
+            )
+        };
+        of(&self.clocks[0]).max(of(&self.clocks[1]))
+    }
+
+    /// Threshold of the detector, nats.
+    #[must_use]
+    pub const fn threshold(&self) -> f64 {
+        self.threshold
+    }
+
+    /// Idle time behind the threshold, s.
+    #[must_use]
+    pub const fn idle_s(&self) -> f64 {
+        self.idle_s
+    }
+
+    /// Number of places at which a touch is known.
+    #[must_use]
+    pub fn places(&self) -> usize {
+        self.touches.places()
+    }
+
+    /// Events per second of both cameras on an idle skin.
+    #[must_use]
+    pub fn idle_per_s(&self) -> f64 {
+        self.touches.idle_per_s()
+    }
+
+    /// Whether positions have regions.
+    #[must_use]
+    pub const fn has_regions(&self) -> bool {
+        self.settling.is_some()
+    }
+}

@@ -1,0 +1,32 @@
+//! What the calibration presses of a session that is under way teach about its skin.
+
+use std::path::Path;
+
+use skinrig_online::SkinModel;
+
+use crate::error::{NotLearnt, ResultsError};
+use crate::session::Session;
+use crate::settings::AnalysisOptions;
+use crate::stages::analyze;
+
+/// Learns from the session at `path`, which may be under way, for at most this many false alarms per second (above 0). The clocks are
+/// those of its only leg.
+///
+/// # Errors
+/// [`ResultsError`] if it has no analysis; [`ResultsError::NotLearnt`] if that must not be used, or teaches too little.
+pub fn learn_skin(path: &Path, false_alarms_hz: f64) -> Result<SkinModel, ResultsError> {
+    let analyzed = analyze(path, AnalysisOptions::default())?;
+    if !analyzed.legs.is_empty() {
+        let legs = analyzed.legs.len() + 1;
+        return Err(NotLearnt::Legs { legs }.into());
+    }
+    if !analyzed.analysis.is_valid() {
+        let because = analyzed.analysis.invalid_because();
+        return Err(NotLearnt::Invalid { because }.into());
+    }
+    let aligned = Session::open(path, AnalysisOptions::default())?
+        .read_input()?
+        .align();
+    let skin = SkinModel::learn(&analyzed.analysis, &aligned.events, false_alarms_hz);
+    Ok(skin.map_err(NotLearnt::Presses)?)
+}
