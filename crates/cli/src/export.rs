@@ -14,44 +14,62 @@ use crate::args::{ExportArgs, ExportKind, ExportTable};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::{SESSION_SUFFIX, beside};
 use crate::results::{self, Results};
+use crate::selection::{self, Target};
 
 /// Writes the requested formats and prints the paths of the files.
 ///
 /// # Errors
 /// [`Failure::input`] for an unreadable session; [`Failure::internal`] when a file cannot be written.
 pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
-    let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
-    let header = reader.header().map_err(Failure::session)?;
     let is_bundle = args.kinds.contains(&ExportKind::Bundle);
+    let targets = selection::sessions(&args.session)?;
+    if is_bundle && targets.selection.is_some() {
+        return Err(Failure::input(format!(
+            "--to bundle: expected a session, found the selection {}\n  next: `skinrig publish` packs a selection",
+            args.session.display()
+        )));
+    }
     if is_bundle && (args.kinds.len() > 1 || !args.only.is_empty()) {
         return Err(Failure::input(
             "--to bundle: expected no other format and no --only\n  next: use a second `skinrig export` for those",
         ));
     }
-    let folder = folder(args, if is_bundle { ".bundle" } else { ".export" })?;
-    let written = if is_bundle {
-        bundle(&args.session, &reader, &header, &folder)?
-    } else {
-        files(args, &reader, &header, &folder)?
-    };
-    if json {
-        crate::terminal::print_json(
-            &serde_json::json!({ "folder": folder.path(), "written": written }),
-        );
-    } else {
-        for path in &written {
-            outln!("{}", path.display());
+    let mut documents = Vec::new();
+    let all = targets.each(|target| {
+        let (folder, written) = export_one(args, target, is_bundle)?;
+        if !json {
+            written.iter().for_each(|path| outln!("{}", path.display()));
         }
+        documents.push(serde_json::json!({ "folder": folder.path(), "written": written }));
+        Ok(Exit::Ok)
+    });
+    if json && !documents.is_empty() {
+        targets.print(documents);
     }
-    Ok(Exit::Ok)
+    all
 }
 
-/// The folder given with `--out`, else one beside the session.
-fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
-    let path = args
-        .out
-        .clone()
-        .unwrap_or_else(|| beside(&args.session, ending));
+/// Exports one session; returns the folder and the files.
+fn export_one(
+    args: &ExportArgs,
+    target: &Target,
+    is_bundle: bool,
+) -> Result<(Folder, Vec<PathBuf>), Failure> {
+    let reader = SessionReader::open(&target.path).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
+    let folder = folder(args, target, if is_bundle { ".bundle" } else { ".export" })?;
+    let written = if is_bundle {
+        bundle(&target.path, &reader, &header, &folder)?
+    } else {
+        files(args, target, &reader, &header, &folder)?
+    };
+    Ok((folder, written))
+}
+
+/// The folder given with `--out`, else one beside the session. Files from a selection carry its label.
+fn folder(args: &ExportArgs, target: &Target, ending: &str) -> Result<Folder, Failure> {
+    let session = &target.path;
+    let path = args.out.clone().unwrap_or_else(|| beside(session, ending));
     // In an untrusted folder a link could lead anywhere.
     if args.out.is_none() && path.is_symlink() {
         return Err(Failure::internal(format!(
@@ -59,8 +77,15 @@ fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
             path.display()
         )));
     }
-    let stem = beside(&args.session, "");
-    let stem = stem.file_name().unwrap_or_default().to_string_lossy();
+    let stem = beside(session, "");
+    let mut stem = stem
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    if let Some(selected) = &target.selected {
+        stem = format!("{stem}.{}", selected.label());
+    }
     Folder::new(&path, &stem, args.overwrite).map_err(Failure::internal)
 }
 
@@ -102,6 +127,7 @@ fn kinds(requested: &[ExportKind]) -> Vec<ExportKind> {
 /// Exports all formats except a bundle.
 fn files(
     args: &ExportArgs,
+    target: &Target,
     reader: &SessionReader,
     header: &RunHeader,
     folder: &Folder,
@@ -116,7 +142,11 @@ fn files(
     let tabular = |kind: &ExportKind| kind.is_tabular();
     let needed = kinds.iter().any(tabular) && tables.iter().any(|t| t.needs_analysis());
     let results = if needed {
-        let found = results::analyze_shown(&args.session, AnalysisRequest::default());
+        let choices = AnalysisRequest {
+            selection: target.selected.as_ref(),
+            ..AnalysisRequest::default()
+        };
+        let found = results::analyze_shown(&target.path, choices);
         Some(found.map_err(without_analysis)?)
     } else {
         None

@@ -6,6 +6,7 @@ mod terminal;
 
 mod analyses;
 pub mod analysis_request;
+mod analyze;
 mod args;
 mod catalogue;
 mod challenge;
@@ -44,6 +45,7 @@ mod run;
 mod salvage;
 mod sample_size;
 mod schema;
+pub mod selection;
 mod sessions;
 mod show;
 mod signals;
@@ -131,14 +133,15 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Catalogue(a) => catalogue::catalogue(a, json),
         Command::Sessions(a) => sessions::sessions(a, json),
         Command::Show(a) => show::show(a, json),
-        Command::Analyze(a) => results::analyze(a, output),
-        Command::Report(a) => results::report(a, json),
+        Command::Analyze(a) => analyze::analyze(a, output),
+        Command::Report(a) => analyze::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, output),
         Command::Online(a) => online::online(a, output),
         Command::Verify(a) => verify::verify(a, json),
         Command::Salvage(a) => salvage::salvage(a, json),
         Command::Import(a) => import::import(a, &command_line(arguments), output),
+        Command::Select(a) => selection::select(a, json),
         Command::Export(a) => export::export(a, json),
         Command::Challenge(a) => challenge::challenge(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),

@@ -5,12 +5,15 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use skinrig_export::{BundleReport, Folder, same_bytes, verify_bundle};
-use skinrig_recorder::{PressTally, Problem, RecorderError, SessionReader, verify as recheck};
+use skinrig_recorder::{
+    PressTally, Problem, RecorderError, SessionReader, VerifyReport, verify as recheck,
+};
 
 use crate::args::SessionArg;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
 use crate::phase::Phase;
+use crate::selection;
 use skinrig_results::Rescan;
 
 /// Recomputes everything in a session, and compares the files of a bundle with its manifest.
@@ -21,7 +24,23 @@ pub(crate) fn verify(args: &SessionArg, json: bool) -> Outcome {
     if args.session.is_dir() {
         return bundle(&args.session, json);
     }
-    session(&args.session, json)
+    // Reading a selection compares its hashes with the seals; this compares the seals with the content.
+    let targets = selection::sessions(&args.session)?;
+    let mut documents = Vec::new();
+    let all = targets.each(|target| {
+        let report = check(&target.path)?;
+        let name = target.path.display();
+        if json {
+            documents.push(document(&target.path, &report));
+        } else {
+            print(&name, &report);
+        }
+        outcome(&name, &report)
+    });
+    if json {
+        targets.print(documents);
+    }
+    all
 }
 
 /// Checks every file of a bundle, then its session.
@@ -172,41 +191,46 @@ fn presses(presses: PressTally, sync: PressTally) -> String {
     }
 }
 
-fn session(path: &Path, json: bool) -> Outcome {
+/// Recomputes everything in a session.
+fn check(path: &Path) -> Result<VerifyReport, Failure> {
     if let Err(e @ RecorderError::NotASession { .. }) = SessionReader::open(path) {
         return Err(Failure::session(e));
     }
-    let phase = Phase::begin("checking every byte");
-    let report = recheck::<Rescan>(path).map_err(Failure::session)?;
-    drop(phase);
-    let name = path.display();
-    if json {
-        crate::terminal::print_json(&serde_json::json!({
-            "session": path, "sound": report.is_sound(), "sealed": report.sealed,
-            "problems": report.problems, "more_problems": report.more_problems, "remarks": report.remarks,
-            "totals": report.totals,
-        }));
-    } else {
-        print_problems(&name, &report.problems, report.more_problems);
-        for remark in &report.remarks {
-            outln!("{name}: note: {remark}");
-        }
-        if let (true, Some(t)) = (report.is_sound(), report.totals) {
-            outln!(
-                "{name}: sound{}; {}, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
-                if report.sealed {
-                    ", sealed"
-                } else {
-                    ", but not sealed: camera bytes, poses and counts were checked, not every byte"
-                },
-                presses(t.presses, t.sync),
-                t.cd_events,
-                t.chunks,
-                t.raw_bytes as f64 / 1e6,
-                t.pose_samples
-            );
-        }
+    let _phase = Phase::begin("checking every byte");
+    recheck::<Rescan>(path).map_err(Failure::session)
+}
+
+fn document(path: &Path, report: &VerifyReport) -> serde_json::Value {
+    serde_json::json!({
+        "session": path, "sound": report.is_sound(), "sealed": report.sealed,
+        "problems": report.problems, "more_problems": report.more_problems, "remarks": report.remarks,
+        "totals": report.totals,
+    })
+}
+
+fn print(name: &impl Display, report: &VerifyReport) {
+    print_problems(name, &report.problems, report.more_problems);
+    for remark in &report.remarks {
+        outln!("{name}: note: {remark}");
     }
+    if let (true, Some(t)) = (report.is_sound(), report.totals) {
+        outln!(
+            "{name}: sound{}; {}, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
+            if report.sealed {
+                ", sealed"
+            } else {
+                ", but not sealed: camera bytes, poses and counts were checked, not every byte"
+            },
+            presses(t.presses, t.sync),
+            t.cd_events,
+            t.chunks,
+            t.raw_bytes as f64 / 1e6,
+            t.pose_samples
+        );
+    }
+}
+
+fn outcome(name: &impl Display, report: &VerifyReport) -> Outcome {
     if report.is_sound() {
         Ok(Exit::Ok)
     } else {

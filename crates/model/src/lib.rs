@@ -67,7 +67,8 @@ pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
     Estimator, LatencySettings, Locator, Precision, ReducedLatencySettings, ReducedThresholdGrid,
-    ReductionSettings, RigGeometry, ThresholdGrid, ThresholdRule, WindowAnchor,
+    ReductionSettings, RigGeometry, SelectedOut, SelectionReason, ThresholdGrid, ThresholdRule,
+    WindowAnchor,
 };
 pub use skin::{OUTLINE_SHAPE, SkinOutline};
 pub use stopping::{Look, StopAnswer, StopMetric, StopQuestion};

@@ -7,9 +7,9 @@
 //! 4. [`Plan::summary`] and [`path_svg`] display it.
 //!
 //! [`Schedule`] describes a recording made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] the margins
-//! of a comparison; [`Suite`] the checks of a bench. The settings structs declare the keys of each
+//! of a comparison; [`Selection`] the sessions and presses of a result; [`Suite`] the checks of a bench. The settings structs declare the keys of each
 //! language and yield its JSON Schema ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`],
-//! [`suite_schema_json`]).
+//! [`selection_schema_json`], [`suite_schema_json`]).
 
 pub mod area;
 mod assemble;
@@ -32,6 +32,7 @@ mod retakes;
 pub mod rig;
 pub mod schedule;
 mod schema;
+pub mod selection;
 pub mod stop;
 pub mod suite;
 pub mod summary;
@@ -56,9 +57,10 @@ pub use retakes::Retakes;
 pub use rig::{RigFile, RigKind};
 pub use schedule::Schedule;
 pub use schema::{
-    limits_schema_json, rig_schema_json, schedule_schema_json, schema_json, setting_doc,
-    suite_schema_json,
+    limits_schema_json, rig_schema_json, schedule_schema_json, schema_json, selection_schema_json,
+    setting_doc, suite_schema_json,
 };
+pub use selection::Selection;
 pub use skinrig_settings::{Diagnostic, Diagnostics, Location};
 pub use stop::{DeclaredStop, Stop};
 pub use suite::Suite;

@@ -1,4 +1,4 @@
-//! JSON Schemas (draft 2020-12) of the five languages, from their tables.
+//! JSON Schemas (draft 2020-12) of the six languages, from their tables.
 
 use std::collections::BTreeMap;
 
@@ -27,6 +27,12 @@ pub fn rig_schema_json() -> String {
 #[must_use]
 pub fn limits_schema_json() -> String {
     render(crate::limits::Limits::TABLE, "skinrig limits")
+}
+
+/// The JSON Schema of a selection, as `skinrig select` writes it.
+#[must_use]
+pub fn selection_schema_json() -> String {
+    render(crate::selection::Selection::TABLE, "skinrig selection")
 }
 
 /// The JSON Schema of a suite for `skinrig hil run`.

@@ -40,6 +40,7 @@ pub(crate) fn analyze<'py>(
             reference_code,
             name: name.as_deref(),
             calibration_from: calibration_from.as_deref(),
+            selection: None,
         };
         library::analyze(&path, choices, save).map(|document| document.to_string())
     });

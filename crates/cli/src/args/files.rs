@@ -158,7 +158,7 @@ pub(crate) enum ExportTable {
 /// Arguments of `export`.
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
-    /// The session file.
+    /// The session file, or a selection.
     pub session: PathBuf,
 
     /// Output format. Can be given several times.
@@ -176,6 +176,38 @@ pub(crate) struct ExportArgs {
     /// Overwrite the files of an earlier export.
     #[arg(long)]
     pub overwrite: bool,
+}
+
+/// Presses that do not count, and why.
+#[derive(Debug, Clone)]
+pub(crate) struct Exclude {
+    /// Numbers and spans, separated by commas.
+    pub presses: String,
+    pub reason: String,
+}
+
+/// Arguments of `select`.
+#[derive(Debug, Args)]
+pub(crate) struct SelectArgs {
+    /// Sealed session files.
+    #[arg(required = true, value_name = "SESSION")]
+    pub sessions: Vec<PathBuf>,
+
+    /// Name of the selection; results from it show the name.
+    #[arg(long)]
+    pub name: String,
+
+    /// Presses that do not count, and why, for example `"7,12-14=the lamp failed"`. Can be given several times.
+    #[arg(long, value_name = "PRESSES=REASON", value_parser = super::values::exclude, requires = "decided_by")]
+    pub exclude: Vec<Exclude>,
+
+    /// Who decided on the exclusions.
+    #[arg(long, value_name = "PERSON")]
+    pub decided_by: Option<String>,
+
+    /// The file to write.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
 }
 
 /// Arguments of `inspect`.
@@ -200,6 +232,8 @@ pub(crate) enum SchemaKind {
     Rig,
     /// Limits (`compare`).
     Limits,
+    /// Selections (`select`).
+    Selection,
     /// Suites (`hil run`).
     Suite,
 }

@@ -36,6 +36,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "catalogue",
             "show",
             "tag",
+            "select",
             "verify",
             "salvage",
             "export",

@@ -24,9 +24,9 @@ pub(crate) use self::evaluate::{
     AnalyzeArgs, CompareArgs, CostKind, OnlineArgs, ReportArgs, TradeoffArgs,
 };
 pub(crate) use self::files::{
-    CompletionsArgs, ExportArgs, ExportKind, ExportTable, ImportArgs, InitArgs, InspectArgs,
-    ManArgs, NewArgs, PrototypesArgs, SalvageArgs, SchemaArgs, SchemaKind, SessionsArgs, ShowArgs,
-    TagArgs,
+    CompletionsArgs, Exclude, ExportArgs, ExportKind, ExportTable, ImportArgs, InitArgs,
+    InspectArgs, ManArgs, NewArgs, PrototypesArgs, SalvageArgs, SchemaArgs, SchemaKind, SelectArgs,
+    SessionsArgs, ShowArgs, TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
 pub(crate) use self::values::StopRule;
@@ -226,6 +226,15 @@ pub(crate) enum Command {
     )]
     Salvage(SalvageArgs),
 
+    /// Write a selection: sessions by the hash of their content, and presses that do not count, with reasons.
+    #[command(
+        after_help = "Example:\n  skinrig select sessions/NAME.session.sqlite --name \"mold 3, lamp on\" \\\n    \
+        --exclude \"7,12-14=the lamp failed\" --decided-by \"A. Person\" --out lamp-on.selection.yaml\n\n\
+        `analyze`, `report`, `compare`, `tradeoff`, `export` and `verify` take a selection for a session. Results from it are variants,\n\
+        name its hash, and state the RMSE without it."
+    )]
+    Select(SelectArgs),
+
     /// Import the published dataset's files as a session.
     #[command(
         after_help = "Example:\n  skinrig import --camera1 camera1.hdf5 --camera2 camera2.hdf5 \\\n    \
@@ -292,9 +301,9 @@ pub struct ProtocolArgs {
     pub overrides: Vec<String>,
 }
 
-/// A session file or a bundle.
+/// A session file, a selection or a bundle.
 #[derive(Debug, Args)]
 pub(crate) struct SessionArg {
-    /// The session file, or the folder of a bundle.
+    /// The session file, a selection, or the folder of a bundle.
     pub session: PathBuf,
 }

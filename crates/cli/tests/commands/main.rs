@@ -42,6 +42,7 @@ mod replay;
 mod resume;
 mod rigs;
 mod sample_size;
+mod selection;
 #[path = "../../../notify/tests/it/servers.rs"]
 mod servers;
 mod special;

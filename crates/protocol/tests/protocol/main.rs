@@ -12,6 +12,7 @@ mod remaining;
 mod rig;
 mod scene;
 mod schedules;
+mod selection;
 mod shipped;
 mod stop;
 mod suite;
