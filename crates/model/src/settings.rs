@@ -7,6 +7,7 @@ use crate::camera::StereoGeometry;
 use crate::id::PressId;
 use crate::lens::LensKind;
 use crate::remount::RemountSettings;
+use crate::selection::{SelectedOut, SelectionReason};
 use crate::skin::SkinOutline;
 
 /// Times are kept in whole nanoseconds.
@@ -488,25 +489,6 @@ pub struct AnalysisSettings {
     /// Width of the event-rate bins; the paper's 10 ms.
     #[setting(default = "10 ms", min = 0.1, max = 10_000.0)]
     pub rate_bin_ms: f64,
-}
-
-/// A press that a selection excludes.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SelectedOut {
-    /// The press.
-    pub press: PressId,
-    /// Why.
-    #[serde(flatten)]
-    pub why: SelectionReason,
-}
-
-/// Why a selection excludes a press, and who decided it.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct SelectionReason {
-    /// The reason, as its author wrote it.
-    pub reason: String,
-    /// Who decided.
-    pub decided_by: String,
 }
 
 /// Rows that are used, both ends included.

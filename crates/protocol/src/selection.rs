@@ -174,12 +174,12 @@ impl SelectedSession {
         out: &mut Collector,
     ) -> Option<SessionFacts> {
         let (file, hash) = (field.at("file"), field.at("content_sha256"));
-        let finding = match look_up(&self.file) {
+        match look_up(&self.file) {
             Ok(facts) if facts.content_sha256.as_ref() == Some(&self.content_sha256) => {
                 return Some(facts);
             }
-            Ok(facts) => out
-                .error(
+            Ok(facts) => {
+                out.error(
                     hash.span,
                     hash.path.as_str(),
                     "the session has another content",
@@ -192,18 +192,20 @@ impl SelectedSession {
                 .help(format!(
                     "restore the file, or name {} in a new selection with `skinrig select`",
                     facts.path.display()
-                )),
-            Err(SessionFault::Missing) => out
-                .error(file.span, file.path.as_str(), "the session is missing")
-                .expected("a session file, from the folder of the selection or beside it")
-                .found(quote(&self.file))
-                .help("copy the session beside the selection"),
-            Err(SessionFault::Unreadable(why)) => out
-                .error(file.span, file.path.as_str(), "the session cannot be read")
-                .expected("a readable session")
-                .found(why),
-        };
-        drop(finding);
+                ));
+            }
+            Err(SessionFault::Missing) => {
+                out.error(file.span, file.path.as_str(), "the session is missing")
+                    .expected("a session file, from the folder of the selection or beside it")
+                    .found(quote(&self.file))
+                    .help("copy the session beside the selection");
+            }
+            Err(SessionFault::Unreadable(why)) => {
+                out.error(file.span, file.path.as_str(), "the session cannot be read")
+                    .expected("a readable session")
+                    .found(why);
+            }
+        }
         None
     }
 }

@@ -7,7 +7,7 @@ use skinrig_compare::{Session, Subject};
 use skinrig_recorder::{SessionReader, list};
 
 use super::facts::facts;
-use super::selections::{self, SelectedResult};
+use super::selections::{self, SelectedResult, without_results};
 use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
 use crate::analyze::without_selection;
@@ -172,11 +172,4 @@ fn session(
         }
     };
     Ok((Session { facts, analysis }, None))
-}
-
-pub(super) fn without_results(path: &Path, failure: Failure) -> Failure {
-    Failure {
-        message: format!("{}\n  ({}: no results)", failure.message, path.display()),
-        ..failure
-    }
 }

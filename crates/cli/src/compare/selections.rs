@@ -7,7 +7,6 @@ use skinrig_analysis::Analysis;
 use skinrig_analysis::result::Estimate;
 use skinrig_report::{SelectionEffect, SelectionName};
 
-use super::inputs::without_results;
 use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
@@ -53,6 +52,14 @@ pub(super) fn analysis(
         rmse_without_mm: rmse_mm,
     });
     Ok((found.analysis, result(rmse_mm, effect)))
+}
+
+/// An analysis that failed, with its session.
+pub(super) fn without_results(path: &Path, failure: Failure) -> Failure {
+    Failure {
+        message: format!("{}\n  ({}: no results)", failure.message, path.display()),
+        ..failure
+    }
 }
 
 impl SelectedResult {
