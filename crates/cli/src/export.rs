@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{Analysis, LegStart};
 use skinrig_export::{
-    CsvFiles, ExportError, Folder, NpzFile, ParquetFiles, Source, TableName, TableWriter,
+    CsvFiles, ExportError, Folder, MANIFEST, NpzFile, ParquetFiles, Source, TableName, TableWriter,
 };
 use skinrig_model::{CameraId, RunHeader};
 use skinrig_recorder::{SessionReader, tags_path};
@@ -15,6 +15,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::{SESSION_SUFFIX, beside};
 use crate::results::{self, Results};
 use crate::selection::{self, Target};
+use crate::signature;
 
 /// Writes the requested formats and prints the paths of the files.
 ///
@@ -32,6 +33,11 @@ pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
     if is_bundle && (args.kinds.len() > 1 || !args.only.is_empty()) {
         return Err(Failure::input(
             "--to bundle: expected no other format and no --only\n  next: use a second `skinrig export` for those",
+        ));
+    }
+    if !is_bundle && args.sign.is_some() {
+        return Err(Failure::input(
+            "--sign: expected --to bundle, found another format\n  next: add --to bundle, or leave --sign out",
         ));
     }
     let mut documents = Vec::new();
@@ -59,7 +65,11 @@ fn export_one(
     let header = reader.header().map_err(Failure::session)?;
     let folder = folder(args, target, if is_bundle { ".bundle" } else { ".export" })?;
     let written = if is_bundle {
-        bundle(&target.path, &reader, &header, &folder)?
+        let mut written = bundle(&target.path, &reader, &header, &folder)?;
+        if let Some(key) = &args.sign {
+            written.push(signature::sign(key, &folder.path().join(MANIFEST))?);
+        }
+        written
     } else {
         files(args, target, &reader, &header, &folder)?
     };
@@ -258,17 +268,7 @@ pub(crate) fn derived(
     let mut results = results::analyze_shown(session, AnalysisRequest::default())?;
     // Measured on one machine at one time: it does not follow from the session.
     results.tradeoff = None;
-    let (json, html) = results::documents(&results)?;
-    let mut written = Vec::new();
-    for (ending, text) in [(".results.json", json), (".report.html", html)] {
-        let file = folder.write_atomic(ending, |to| {
-            std::fs::write(to, &text).map_err(|e| ExportError::File {
-                path: to.to_owned(),
-                found: e.to_string(),
-            })
-        });
-        written.push(file.map_err(refused)?);
-    }
+    let mut written = documents(&results, folder)?;
     let source = Source {
         reader,
         header,
@@ -285,13 +285,54 @@ pub(crate) fn derived(
     Ok(written)
 }
 
+/// Writes results and report.
+fn documents(results: &Results, folder: &Folder) -> Result<Vec<PathBuf>, Failure> {
+    let (json, html) = results::documents(results)?;
+    let mut written = Vec::new();
+    for (ending, text) in [(".results.json", json), (".report.html", html)] {
+        let file = folder.write_atomic(ending, |to| {
+            std::fs::write(to, &text).map_err(|e| ExportError::File {
+                path: to.to_owned(),
+                found: e.to_string(),
+            })
+        });
+        written.push(file.map_err(refused)?);
+    }
+    Ok(written)
+}
+
+/// Writes what an analysis adds to a session: results, report, and the tables of presses and results.
+///
+/// # Errors
+/// [`Failure::internal`] when a file cannot be written.
+pub(crate) fn results_and_tables(
+    results: &Results,
+    reader: &SessionReader,
+    header: &RunHeader,
+    folder: &Folder,
+) -> Result<Vec<PathBuf>, Failure> {
+    let mut written = documents(results, folder)?;
+    let source = Source {
+        reader,
+        header,
+        analysis: Some(analysis_and_legs(results)),
+    };
+    for kind in [ExportKind::Parquet, ExportKind::Csv] {
+        written.extend(one_kind(kind, &source, &BUNDLED[..2], folder).map_err(refused)?);
+    }
+    Ok(written)
+}
+
 /// The tables of a bundle.
 const BUNDLED: [TableName; 3] = [TableName::Presses, TableName::Results, TableName::Pose];
 /// Suffix of the file of tags and notes.
 pub(crate) const TAGS: &str = ".tags.jsonl";
 
 /// Writes the session, its results, camera streams and tables into a folder that `verify` can check.
-fn bundle(
+///
+/// # Errors
+/// [`Failure::input`] for a session without a seal; otherwise as [`derived`].
+pub(crate) fn bundle(
     session: &Path,
     reader: &SessionReader,
     header: &RunHeader,
@@ -342,6 +383,6 @@ fn bundle(
         &names,
     )
     .map_err(refused)?;
-    written.push(folder.path().join(skinrig_export::MANIFEST));
+    written.push(folder.path().join(MANIFEST));
     Ok(written)
 }

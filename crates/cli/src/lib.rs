@@ -36,6 +36,7 @@ mod phase;
 mod progress;
 mod prototypes;
 mod provenance;
+mod publish;
 mod recording;
 mod remote;
 pub mod results;
@@ -49,6 +50,7 @@ pub mod selection;
 mod sessions;
 mod show;
 mod signals;
+mod signature;
 pub mod sink;
 mod status;
 mod supervise;
@@ -142,6 +144,8 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Salvage(a) => salvage::salvage(a, json),
         Command::Import(a) => import::import(a, &command_line(arguments), output),
         Command::Select(a) => selection::select(a, json),
+        Command::Publish(a) => publish::publish(a, json),
+        Command::Reproduce(a) => publish::reproduce(a, json),
         Command::Export(a) => export::export(a, json),
         Command::Challenge(a) => challenge::challenge(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),

@@ -37,6 +37,14 @@ pub enum ExportError {
         /// Number of rows found.
         found: u64,
     },
+    /// The folder is not an RO-Crate.
+    #[error("{}: expected an RO-Crate 1.1, found {found}\n  next: create one with `skinrig publish`", path.display())]
+    NotACrate {
+        /// Its description.
+        path: PathBuf,
+        /// Why it is not one.
+        found: String,
+    },
     /// The folder is not a bundle.
     #[error("{}: expected a bundle, found {found}\n  next: create one with `skinrig export SESSION --to bundle`", path.display())]
     NotABundle {

@@ -1,4 +1,5 @@
-//! Exports a session in other formats: tables (Parquet, npz, CSV), camera files (RAW, HDF5), and verifiable bundles.
+//! Exports a session in other formats: tables (Parquet, npz, CSV), camera files (RAW, HDF5), verifiable bundles,
+//! and RO-Crates.
 //!
 //! There are four [`tables`](Source::write): `presses` (one row per press, with its analysis), `pose`, `results`, and the
 //! events of each camera. A [`TableWriter`] takes a table batch by batch, so memory stays constant for any session length.
@@ -17,17 +18,23 @@ mod metrics;
 mod npz;
 mod parquet_files;
 mod presses;
+mod rocrate;
 mod source;
 mod streams;
 pub mod table;
 mod tables;
 
-pub use bundle::{BundleReport, MANIFEST, seal_bundle, verify_bundle};
+pub use bundle::{BundleReport, MANIFEST, SIGNATURE_ENDING, seal_bundle, verify_bundle};
 pub use cameras::{write_hdf5, write_raw};
 pub use csv_files::CsvFiles;
 pub use error::ExportError;
 pub use folder::{Folder, same_bytes};
+pub use metrics::{MetricRow, metric_rows};
 pub use npz::NpzFile;
 pub use parquet_files::ParquetFiles;
+pub use rocrate::{
+    CrateDescription, CrateNumber, CrateOrganisation, CratePerson, CrateReport, METADATA,
+    seal_crate, verify_crate,
+};
 pub use source::{Source, TableName};
 pub use table::TableWriter;

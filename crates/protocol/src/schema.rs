@@ -1,4 +1,4 @@
-//! JSON Schemas (draft 2020-12) of the six languages, from their tables.
+//! JSON Schemas (draft 2020-12) of the languages, from their tables.
 
 use std::collections::BTreeMap;
 
@@ -33,6 +33,15 @@ pub fn limits_schema_json() -> String {
 #[must_use]
 pub fn selection_schema_json() -> String {
     render(crate::selection::Selection::TABLE, "skinrig selection")
+}
+
+/// The JSON Schema of what a publication states, for `skinrig publish --about`.
+#[must_use]
+pub fn publication_schema_json() -> String {
+    render(
+        crate::publication::Publication::TABLE,
+        "skinrig publication",
+    )
 }
 
 /// The JSON Schema of a suite for `skinrig hil run`.

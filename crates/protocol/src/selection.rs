@@ -34,7 +34,7 @@ pub struct Selection {
 #[derive(Debug, Clone, PartialEq, Settings)]
 #[settings(name = "selected_session")]
 pub struct SelectedSession {
-    /// The session file, from the folder of this file. If it is not there, the same name beside this file.
+    /// The session file, from the folder of this file. If it is not there, the same name beside this file, or in its bundle there.
     #[setting(example = "NAME.session.sqlite")]
     pub file: String,
     /// Hash of its content: the seal's, which `skinrig select` copies.

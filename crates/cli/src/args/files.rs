@@ -173,6 +173,10 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 
+    /// Sign the manifest of a bundle with this private key of `ssh-keygen`.
+    #[arg(long, value_name = "KEY")]
+    pub sign: Option<PathBuf>,
+
     /// Overwrite the files of an earlier export.
     #[arg(long)]
     pub overwrite: bool,
@@ -210,6 +214,38 @@ pub(crate) struct SelectArgs {
     pub out: PathBuf,
 }
 
+/// Arguments of `publish`.
+#[derive(Debug, Args)]
+pub(crate) struct PublishArgs {
+    /// Sealed session files, or one selection.
+    #[arg(required = true, value_name = "SESSION")]
+    pub sessions: Vec<PathBuf>,
+
+    /// File with what skinrig cannot know: title, description, people, licence, known limits.
+    #[arg(long, value_name = "FILE")]
+    pub about: PathBuf,
+
+    /// A new folder for the crate.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+
+    /// Sign the description with this private key of `ssh-keygen`.
+    #[arg(long, value_name = "KEY")]
+    pub sign: Option<PathBuf>,
+}
+
+/// Arguments of `reproduce`.
+#[derive(Debug, Args)]
+pub(crate) struct ReproduceArgs {
+    /// The folder of the crate.
+    #[arg(value_name = "CRATE")]
+    pub folder: PathBuf,
+
+    /// Require a signature by a key in this file of allowed signers, with lines such as `NAME ssh-ed25519 KEY`.
+    #[arg(long, value_name = "FILE")]
+    pub signers: Option<PathBuf>,
+}
+
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
 pub(crate) struct InspectArgs {
@@ -234,6 +270,8 @@ pub(crate) enum SchemaKind {
     Limits,
     /// Selections (`select`).
     Selection,
+    /// What a publication states (`publish --about`).
+    Publication,
     /// Suites (`hil run`).
     Suite,
 }

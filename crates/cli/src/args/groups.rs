@@ -40,6 +40,8 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "verify",
             "salvage",
             "export",
+            "publish",
+            "reproduce",
             "challenge",
             "inspect",
         ],

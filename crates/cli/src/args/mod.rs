@@ -25,8 +25,8 @@ pub(crate) use self::evaluate::{
 };
 pub(crate) use self::files::{
     CompletionsArgs, Exclude, ExportArgs, ExportKind, ExportTable, ImportArgs, InitArgs,
-    InspectArgs, ManArgs, NewArgs, PrototypesArgs, SalvageArgs, SchemaArgs, SchemaKind, SelectArgs,
-    SessionsArgs, ShowArgs, TagArgs,
+    InspectArgs, ManArgs, NewArgs, PrototypesArgs, PublishArgs, ReproduceArgs, SalvageArgs,
+    SchemaArgs, SchemaKind, SelectArgs, SessionsArgs, ShowArgs, TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
 pub(crate) use self::values::StopRule;
@@ -215,9 +215,9 @@ pub(crate) enum Command {
 
     /// Verify every checksum, count and hash of a session or of a bundle made by `export`.
     #[command(
-        after_help = "Examples:\n  skinrig verify sessions/NAME.session.sqlite\n  skinrig verify NAME.bundle"
+        after_help = "Examples:\n  skinrig verify sessions/NAME.session.sqlite\n  skinrig verify NAME.bundle --signers signers"
     )]
-    Verify(SessionArg),
+    Verify(VerifyArgs),
 
     /// Copy the intact part of a damaged session into a new file, and list what was lost.
     #[command(
@@ -249,6 +249,19 @@ pub(crate) enum Command {
         skinrig export sessions/NAME.session.sqlite --to bundle --out NAME.bundle"
     )]
     Export(ExportArgs),
+
+    /// Publish sessions or a selection as an RO-Crate: data card, checksums, bundles, protocols, and numbers to derive again.
+    #[command(
+        after_help = "Example:\n  skinrig publish sessions/NAME.session.sqlite --about publication.yaml --out crate/\n\n\
+        `skinrig schema publication` has the keys of the file for --about: title, description, people, licence, known limits."
+    )]
+    Publish(PublishArgs),
+
+    /// Check a published crate: every checksum, and every headline number derived again, bit by bit.
+    #[command(
+        after_help = "Example:\n  skinrig reproduce crate/\n\nExit code 4 if anything differs."
+    )]
+    Reproduce(ReproduceArgs),
 
     /// Give a session's events away with the scored positions sealed, and score estimates from anywhere.
     #[command(
@@ -301,9 +314,13 @@ pub struct ProtocolArgs {
     pub overrides: Vec<String>,
 }
 
-/// A session file, a selection or a bundle.
+/// Arguments of `verify`.
 #[derive(Debug, Args)]
-pub(crate) struct SessionArg {
+pub(crate) struct VerifyArgs {
     /// The session file, a selection, or the folder of a bundle.
     pub session: PathBuf,
+
+    /// Require a signature of the bundle by a key in this file of allowed signers, with lines such as `NAME ssh-ed25519 KEY`.
+    #[arg(long, value_name = "FILE")]
+    pub signers: Option<PathBuf>,
 }

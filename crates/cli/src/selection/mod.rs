@@ -153,8 +153,10 @@ fn read(path: &Path) -> Result<Selection, Failure> {
 
 /// Finds a session from the folder of its selection, or by its name in it.
 fn look_up(folder: &Path, file: &str) -> Result<SessionFacts, SessionFault> {
-    let beside = Path::new(file).file_name().map(|name| folder.join(name));
-    let mut places = [Some(folder.join(file)), beside].into_iter().flatten();
+    let name = Path::new(file).file_name().unwrap_or_default();
+    let beside = folder.join(name);
+    let bundled = crate::paths::beside(&beside, ".bundle").join(name);
+    let mut places = [folder.join(file), beside, bundled].into_iter();
     let path = places.find(|p| p.is_file()).ok_or(SessionFault::Missing)?;
     facts(&path).map_err(|e| SessionFault::Unreadable(e.to_string()))
 }

@@ -36,6 +36,7 @@ mod operator;
 mod options;
 mod pictures;
 mod pipeline;
+mod publish;
 mod python;
 mod remounted;
 mod replay;
@@ -45,6 +46,7 @@ mod sample_size;
 mod selection;
 #[path = "../../../notify/tests/it/servers.rs"]
 mod servers;
+mod signing;
 mod special;
 mod starter;
 mod stopping;
