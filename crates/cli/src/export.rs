@@ -102,6 +102,7 @@ fn folder(args: &ExportArgs, target: &Target, ending: &str) -> Result<Folder, Fa
 pub(crate) fn refused(e: ExportError) -> Failure {
     match e {
         ExportError::Session(e) => Failure::session(e),
+        e @ ExportError::OtherContent { .. } => Failure::input(e),
         e => Failure::internal(e),
     }
 }

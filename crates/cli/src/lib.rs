@@ -25,6 +25,7 @@ mod host;
 mod import;
 mod inspect;
 mod jog;
+mod lake;
 pub mod library;
 mod looks;
 mod man;
@@ -146,6 +147,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Select(a) => selection::select(a, json),
         Command::Publish(a) => publish::publish(a, json),
         Command::Reproduce(a) => publish::reproduce(a, json),
+        Command::Lake(a) => lake::lake(a, json),
         Command::Export(a) => export::export(a, json),
         Command::Challenge(a) => challenge::challenge(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),

@@ -37,6 +37,18 @@ pub enum ExportError {
         /// Number of rows found.
         found: u64,
     },
+    /// A lake has the session with another content.
+    #[error(
+        "{}: expected the content of session {session_id} as the lake has it, found another: the session was resumed, or it is \
+         another bench's\n  next: choose another lake, or remove the session's files from this one",
+        path.display()
+    )]
+    OtherContent {
+        /// Its commit.
+        path: PathBuf,
+        /// The session.
+        session_id: String,
+    },
     /// The folder is not an RO-Crate.
     #[error("{}: expected an RO-Crate 1.1, found {found}\n  next: create one with `skinrig publish`", path.display())]
     NotACrate {

@@ -214,6 +214,18 @@ pub(crate) struct SelectArgs {
     pub out: PathBuf,
 }
 
+/// Arguments of `lake`.
+#[derive(Debug, Args)]
+pub(crate) struct LakeArgs {
+    /// Sealed session files, or folders of sessions.
+    #[arg(required = true, value_name = "SESSION")]
+    pub sessions: Vec<PathBuf>,
+
+    /// Folder of the lake; created if missing.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+}
+
 /// Arguments of `publish`.
 #[derive(Debug, Args)]
 pub(crate) struct PublishArgs {

@@ -40,6 +40,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "verify",
             "salvage",
             "export",
+            "lake",
             "publish",
             "reproduce",
             "challenge",

@@ -25,8 +25,8 @@ pub(crate) use self::evaluate::{
 };
 pub(crate) use self::files::{
     CompletionsArgs, Exclude, ExportArgs, ExportKind, ExportTable, ImportArgs, InitArgs,
-    InspectArgs, ManArgs, NewArgs, PrototypesArgs, PublishArgs, ReproduceArgs, SalvageArgs,
-    SchemaArgs, SchemaKind, SelectArgs, SessionsArgs, ShowArgs, TagArgs,
+    InspectArgs, LakeArgs, ManArgs, NewArgs, PrototypesArgs, PublishArgs, ReproduceArgs,
+    SalvageArgs, SchemaArgs, SchemaKind, SelectArgs, SessionsArgs, ShowArgs, TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
 pub(crate) use self::values::StopRule;
@@ -249,6 +249,12 @@ pub(crate) enum Command {
         skinrig export sessions/NAME.session.sqlite --to bundle --out NAME.bundle"
     )]
     Export(ExportArgs),
+
+    /// Add sessions to a data lake: presses, estimates, features, metrics and poses as one Parquet dataset.
+    #[command(after_help = "Example:\n  skinrig lake sessions/ --to lake/\n\n\
+        Partitions: analysis version, prototype, bench, day. Sessions that are there are not added again. In DuckDB:\n  \
+        SELECT prototype, avg(error_mm) FROM read_parquet('lake/estimates/**/*.parquet', hive_partitioning = true) GROUP BY prototype")]
+    Lake(LakeArgs),
 
     /// Publish sessions or a selection as an RO-Crate: data card, checksums, bundles, protocols, and numbers to derive again.
     #[command(

@@ -27,6 +27,7 @@ mod import_refusals;
 mod installed;
 mod interrupt;
 mod json;
+mod lake;
 #[cfg(target_os = "linux")]
 mod nightly;
 mod notify;
