@@ -297,13 +297,12 @@ fn description(about: &Publication, headline: &Headline) -> CrateDescription {
         let what = format!("Results and tables with the selection {}.", selection.name);
         folders.insert(SELECTED.to_owned(), what);
     }
+    let selected = headline.selection.as_ref();
+    let selected = selected.map_or_else(String::new, |s| format!(", selection {}", s.name));
     let numbers = headline.sessions.iter().flat_map(|session| {
-        let rmse = session
-            .numbers
-            .iter()
-            .filter(|n| n.metric == "rmse" && n.unit == "mm");
-        rmse.map(move |n| CrateNumber {
-            name: format!("{} of {}", n.name(), session.bundle),
+        let is_rmse = |n: &&Number| n.metric == "rmse" && n.unit == "mm";
+        session.numbers.iter().filter(is_rmse).map(|n| CrateNumber {
+            name: format!("{} of {}{selected}", n.name(), session.bundle),
             value: n.value,
             unit: "mm",
         })

@@ -97,6 +97,8 @@ fn a_published_selection_is_derived_again_elsewhere_and_any_edit_fails() {
     ] {
         assert!(card.contains(part), "{part} in {card}");
     }
+    let metadata = std::fs::read_to_string(folder.join("ro-crate-metadata.json")).unwrap();
+    assert!(metadata.contains(".bundle, selection lamp\""), "{metadata}");
     for ending in [
         ".protocol.yaml",
         "publication.yaml",

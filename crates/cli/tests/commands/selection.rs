@@ -107,6 +107,10 @@ fn an_excluded_press_shows_who_excluded_it_and_why_and_what_it_changes() {
     let first = &page[..page.find("<h2").unwrap()];
     assert!(first.contains("data-testid=\"selection\"") && first.contains("without the selection"));
     assert!(page.contains("excluded by the selection"));
+    // Other programs get the same.
+    let found = skinrig::library::analyze(Path::new(&chosen), Default::default(), false);
+    let found = found.map_err(|e| e.message).unwrap();
+    assert_eq!(found["summary"], results["summary"]);
     // The official results stay, and nothing takes the selection's for them.
     assert_eq!(read_json(&before[0]), official);
     let point = skinrig(&["--json", "prototypes", &lab.text("s")])
