@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use skinrig_analysis::Analysis;
 use skinrig_protocol::{Publication, Selection};
-use skinrig_report::Provenance;
+use skinrig_report::{Provenance, derive};
 
 use super::headline::{Headline, Number};
 
@@ -76,11 +76,11 @@ fn selected(selection: Option<&Selection>) -> String {
     );
     let mut none = true;
     for session in &selection.sessions {
-        let only = session.only.iter().map(|choice| ("all but", choice));
+        let only = session.only.iter().map(|choice| ("all but ", choice));
         for (word, choice) in only.chain(session.exclude.iter().map(|choice| ("", choice))) {
             none = false;
             out += &format!(
-                "- {}: {word} presses {} excluded: {} (decided by {})\n",
+                "- {}: {word}presses {} excluded: {} (decided by {})\n",
                 plain(&session.file),
                 skinrig_settings::Setting::text(&choice.presses),
                 plain(&choice.reason),
@@ -149,6 +149,10 @@ fn described(session: &Published) -> String {
             plain(&p.overrides.join(" --set "))
         );
     }
+    out += &format!(
+        "- analysis: version {}, results {}\n",
+        session.analysis.version, p.results_hash
+    );
     for device in &p.devices {
         out += &format!(
             "- {}: {}, serial {}, firmware {}\n",
@@ -178,6 +182,8 @@ fn limits(about: &Publication, sessions: &[Published]) -> String {
                 .map(ToString::to_string),
         );
         found.extend(a.findings.iter().map(|f| f.evidence.to_string()));
+        found.extend(derive::geometry_note(a));
+        found.extend(derive::off_sensor(a));
         let lost = p.lost_bytes.iter().sum::<u64>();
         if lost > 0 {
             found.insert(format!("{lost} bytes of camera data were lost"));

@@ -93,6 +93,7 @@ fn a_published_selection_is_derived_again_elsewhere_and_any_edit_fails() {
         "CC-BY-4.0",
         "SIMULATED",
         "nothing was measured on hardware",
+        "uncalibrated, as configured",
         "presses [4] excluded: hit (decided by A. Person)",
     ] {
         assert!(card.contains(part), "{part} in {card}");
