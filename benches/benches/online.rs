@@ -8,7 +8,7 @@ use skinrig_bench::files::Memory;
 use skinrig_bench::{Table, recording};
 use skinrig_formats::{Decoder, evt2::Encoder};
 use skinrig_model::{CameraId, CdEvent, PressRole, StreamFormat};
-use skinrig_online::{Estimate, IdleStatistic, Live, LiveSettings, Training, learn};
+use skinrig_online::{Decoders, Estimate, Live, SkinModel, StreamSettings};
 
 /// The recording is played this much faster: 1 Mev/s per camera.
 const FASTER: u64 = 125;
@@ -41,25 +41,18 @@ fn main() {
     let events = recording::events(&input);
     let source = Memory(events.clone());
     let analysis = analyze(&input, &source).expect("the recording is valid");
-    let training = Training::of(&analysis).expect("its presses can be learnt from");
-    let model = learn(&training, &source).expect("memory can be read");
-    let idle = IdleStatistic::measure(&model, &training, &source, |_, _| true);
-    let threshold = idle.expect("memory can be read").threshold(0.13);
-    let mut clocks = *training.clocks();
-    for clock in &mut clocks {
-        clock.offset_us /= FASTER as f64;
-    }
-    let faster = model.thinned(FASTER as f64);
+    let skin = SkinModel::learn(&analysis, &source, 0.13).expect("its presses can be learnt from");
+    let faster = skin.played_faster(FASTER as f64);
+    let clocks = *faster.clocks();
     let streams = CameraId::ALL.map(|camera| bytes(&events[camera.index()]));
     let seconds = events[0].last().map_or(0, |e| e.t_us) as f64 / FASTER as f64 * 1e-6;
     let count = (events[0].len() + events[1].len()) as f64 * 1e-6;
     println!(
         "{} places, {:.2} Mev/s per camera",
-        model.places(),
+        skin.places(),
         count / 2.0 / seconds
     );
-    let settings = LiveSettings {
-        threshold,
+    let settings = StreamSettings {
         every_us: 5_000,
         from_us: 0,
     };
@@ -81,7 +74,8 @@ fn main() {
         }
     });
     table.row("bytes to decision", count, || {
-        let mut live = Live::new(formats, &analysis, &faster, &clocks, settings).expect("clocks");
+        let live = Live::new(Decoders::new(formats), &faster, settings);
+        let mut live = live.expect("clocks");
         let mut packets = [0, 1].map(|k| streams[k].chunks(PACKET));
         loop {
             let host_us = |k: usize| {

@@ -3,7 +3,9 @@
 use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use skinrig_model::{CameraId, ExcludedReason, InvalidReason, MissedReason, PressVerdict};
+use skinrig_model::{
+    CameraId, ExcludedReason, InvalidReason, MissedReason, PressVerdict, SelectionReason,
+};
 
 use crate::rule::{JournalRule, Rule, without_numbers};
 use crate::tie::UntimedPress;
@@ -81,6 +83,8 @@ pub enum Exclusion {
     OutsideOutline,
     /// Left out by hand.
     ByHand,
+    /// Left out by a selection.
+    BySelection(SelectionReason),
 }
 
 impl Exclusion {
@@ -116,6 +120,7 @@ impl Exclusion {
             Self::BehindCamera => Rule::BehindCamera,
             Self::OutsideOutline => Rule::OutsideOutline,
             Self::ByHand => Rule::ByHand,
+            Self::BySelection(why) => Rule::BySelection(why.clone()),
         }
     }
 
@@ -138,6 +143,7 @@ impl Exclusion {
             Rule::BehindCamera => "behind camera".to_owned(),
             Rule::OutsideOutline => "outside the skin outline".to_owned(),
             Rule::ByHand => "by hand".to_owned(),
+            Rule::BySelection(_) => self.to_string(),
         }
     }
 }
@@ -167,6 +173,11 @@ impl fmt::Display for Exclusion {
                 write!(f, "nearly parallel rays: sine {sine:.4} < {least}")
             }
             Self::ByHand => f.write_str("left out by hand"),
+            Self::BySelection(why) => write!(
+                f,
+                "excluded by the selection: {} ({})",
+                why.reason, why.decided_by
+            ),
             Self::NoTimes
             | Self::NoPosition
             | Self::NoClock { .. }

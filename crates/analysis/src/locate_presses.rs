@@ -1,10 +1,11 @@
 //! Turns camera observations of the presses into verdicts and locations, by the rules of the settings.
 
-use skinrig_model::{CameraId, PressRole, Verdict};
+use skinrig_model::{AnalysisSettings, CameraId, PressId, PressRole, Verdict};
 
 use crate::calibrate::{SessionCalibration, calibrate_session, reject_presses};
 use crate::check;
 use crate::error::RecalibrationError;
+use crate::exclusion::Exclusion;
 use crate::input::SessionInput;
 use crate::locator::{
     self, CameraFeatures, EarlierCalibration, Effort, FittedLocator, LocatorChoice,
@@ -144,6 +145,13 @@ fn located(
     }
 }
 
+/// Why somebody left the press out; `None` if nobody did.
+fn left_out(settings: &AnalysisSettings, press: PressId) -> Option<Exclusion> {
+    let selected = settings.selected_out(press).cloned();
+    let by_hand = || settings.excludes(press).then_some(Exclusion::ByHand);
+    selected.map(Exclusion::BySelection).or_else(by_hand)
+}
+
 fn rows(input: &SessionInput, observations: [CameraObservations<'_>; 2]) -> Vec<PressResult> {
     let has_clock = [0, 1].map(|k| observations[k].has_clock);
     let pairs = input.planned.iter().zip(&input.outcomes).enumerate();
@@ -159,8 +167,8 @@ fn rows(input: &SessionInput, observations: [CameraObservations<'_>; 2]) -> Vec<
                 &views,
                 &input.settings,
             );
-            if input.settings.excludes(planned.id) {
-                judgement = judgement.or_by_hand();
+            if let Some(why) = left_out(&input.settings, planned.id) {
+                judgement = judgement.or_left_out(why);
             }
             for camera in CameraId::ALL {
                 if let Some(untimed) = observations[camera.index()].untimed[i] {

@@ -84,7 +84,7 @@ fn used(input: &SessionInput, analysis: &Analysis) -> Vec<PressResult> {
 }
 
 fn is_left_out_by_hand(press: &PressResult, analysis: &Analysis) -> bool {
-    analysis.settings.excludes(press.press)
+    analysis.settings.excludes(press.press) || analysis.settings.selected_out(press.press).is_some()
 }
 
 fn columns(press: &PressResult) -> [Option<f64>; 2] {

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use skinrig_model::{
     CameraId, ExcludedReason, InvalidReason, MissedReason, PressFault, PressFaultKind,
+    SelectionReason,
 };
 
 /// Why a press does not count, without the press's numbers. Programs decide by it, and the results hash covers it.
@@ -39,6 +40,8 @@ pub enum Rule {
     OutsideOutline,
     /// Left out by hand.
     ByHand,
+    /// Left out by a selection.
+    BySelection(SelectionReason),
 }
 
 /// What the journal says of a press.
@@ -109,8 +112,15 @@ impl Rule {
             | Self::NoClock(_)
             | Self::DataLost(_)
             | Self::NotTimed(_)
-            | Self::ByHand => false,
+            | Self::ByHand
+            | Self::BySelection(_) => false,
         }
+    }
+
+    /// True for a press that somebody left out, whatever its data.
+    #[must_use]
+    pub const fn is_by_hand(&self) -> bool {
+        matches!(self, Self::ByHand | Self::BySelection(_))
     }
 }
 

@@ -53,12 +53,12 @@ impl Judgement {
         }
     }
 
-    /// Excluded by hand, unless the press is missed or invalid anyway.
+    /// Excluded by hand or by a selection, unless the press is missed or invalid anyway.
     #[must_use]
-    pub(crate) fn or_by_hand(self) -> Self {
+    pub(crate) fn or_left_out(self, why: Exclusion) -> Self {
         match self.verdict {
             Verdict::Missed | Verdict::Invalid => self,
-            Verdict::Valid | Verdict::Excluded => Self::excluded(Exclusion::ByHand),
+            Verdict::Valid | Verdict::Excluded => Self::excluded(why),
         }
     }
 
@@ -380,12 +380,12 @@ mod tests {
             })
         );
         assert_eq!(judge(PressRole::Sync, 0, 0), Judgement::VALID);
-        let by_hand = judge(PressRole::Score, 33, 33).or_by_hand();
+        let by_hand = judge(PressRole::Score, 33, 33).or_left_out(Exclusion::ByHand);
         assert_eq!(by_hand.cause, Some(Exclusion::ByHand));
         let lost = Judgement::invalid(Exclusion::DataLost {
             camera: CameraId::One,
         });
-        assert_eq!(lost.clone().or_by_hand(), lost);
+        assert_eq!(lost.clone().or_left_out(Exclusion::ByHand), lost);
     }
 
     #[test]

@@ -13,6 +13,7 @@ use skinrig_report::{Summary, Variant};
 use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
 use crate::paths::{beside, folder_of};
+use crate::selection::SelectedPresses;
 
 pub(crate) use self::stored::stored;
 pub(crate) use self::summary::{SummaryError, summary};
@@ -92,6 +93,7 @@ pub(crate) fn default_name(choices: AnalysisRequest<'_>) -> String {
     let exact = reference
         .into_iter()
         .chain(earlier)
+        .chain(choices.selection.map(SelectedPresses::label))
         .chain(words)
         .collect::<Vec<_>>()
         .join("_");

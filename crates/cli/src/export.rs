@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{Analysis, LegStart};
 use skinrig_export::{
-    CsvFiles, ExportError, Folder, NpzFile, ParquetFiles, Source, TableName, TableWriter,
+    CsvFiles, ExportError, Folder, MANIFEST, NpzFile, ParquetFiles, Source, TableName, TableWriter,
 };
 use skinrig_model::{CameraId, RunHeader};
 use skinrig_recorder::{SessionReader, tags_path};
@@ -14,44 +14,72 @@ use crate::args::{ExportArgs, ExportKind, ExportTable};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::{SESSION_SUFFIX, beside};
 use crate::results::{self, Results};
+use crate::selection::{self, Target};
+use crate::signature;
 
 /// Writes the requested formats and prints the paths of the files.
 ///
 /// # Errors
 /// [`Failure::input`] for an unreadable session; [`Failure::internal`] when a file cannot be written.
 pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
-    let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
-    let header = reader.header().map_err(Failure::session)?;
     let is_bundle = args.kinds.contains(&ExportKind::Bundle);
+    let targets = selection::sessions(&args.session)?;
+    if is_bundle && targets.selection.is_some() {
+        return Err(Failure::input(format!(
+            "--to bundle: expected a session, found the selection {}\n  next: `skinrig publish` packs a selection",
+            args.session.display()
+        )));
+    }
     if is_bundle && (args.kinds.len() > 1 || !args.only.is_empty()) {
         return Err(Failure::input(
             "--to bundle: expected no other format and no --only\n  next: use a second `skinrig export` for those",
         ));
     }
-    let folder = folder(args, if is_bundle { ".bundle" } else { ".export" })?;
-    let written = if is_bundle {
-        bundle(&args.session, &reader, &header, &folder)?
-    } else {
-        files(args, &reader, &header, &folder)?
-    };
-    if json {
-        crate::terminal::print_json(
-            &serde_json::json!({ "folder": folder.path(), "written": written }),
-        );
-    } else {
-        for path in &written {
-            outln!("{}", path.display());
-        }
+    if !is_bundle && args.sign.is_some() {
+        return Err(Failure::input(
+            "--sign: expected --to bundle, found another format\n  next: add --to bundle, or leave --sign out",
+        ));
     }
-    Ok(Exit::Ok)
+    let mut documents = Vec::new();
+    let all = targets.each(|target| {
+        let (folder, written) = export_one(args, target, is_bundle)?;
+        if !json {
+            written.iter().for_each(|path| outln!("{}", path.display()));
+        }
+        documents.push(serde_json::json!({ "folder": folder.path(), "written": written }));
+        Ok(Exit::Ok)
+    });
+    if json && !documents.is_empty() {
+        targets.print(documents);
+    }
+    all
 }
 
-/// The folder given with `--out`, else one beside the session.
-fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
-    let path = args
-        .out
-        .clone()
-        .unwrap_or_else(|| beside(&args.session, ending));
+/// Exports one session; returns the folder and the files.
+fn export_one(
+    args: &ExportArgs,
+    target: &Target,
+    is_bundle: bool,
+) -> Result<(Folder, Vec<PathBuf>), Failure> {
+    let reader = SessionReader::open(&target.path).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
+    let folder = folder(args, target, if is_bundle { ".bundle" } else { ".export" })?;
+    let written = if is_bundle {
+        let mut written = bundle(&target.path, &reader, &header, &folder)?;
+        if let Some(key) = &args.sign {
+            written.push(signature::sign(key, &folder.path().join(MANIFEST))?);
+        }
+        written
+    } else {
+        files(args, target, &reader, &header, &folder)?
+    };
+    Ok((folder, written))
+}
+
+/// The folder given with `--out`, else one beside the session. Files from a selection carry its label.
+fn folder(args: &ExportArgs, target: &Target, ending: &str) -> Result<Folder, Failure> {
+    let session = &target.path;
+    let path = args.out.clone().unwrap_or_else(|| beside(session, ending));
     // In an untrusted folder a link could lead anywhere.
     if args.out.is_none() && path.is_symlink() {
         return Err(Failure::internal(format!(
@@ -59,14 +87,22 @@ fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
             path.display()
         )));
     }
-    let stem = beside(&args.session, "");
-    let stem = stem.file_name().unwrap_or_default().to_string_lossy();
+    let stem = beside(session, "");
+    let mut stem = stem
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    if let Some(selected) = &target.selected {
+        stem = format!("{stem}.{}", selected.label());
+    }
     Folder::new(&path, &stem, args.overwrite).map_err(Failure::internal)
 }
 
 pub(crate) fn refused(e: ExportError) -> Failure {
     match e {
         ExportError::Session(e) => Failure::session(e),
+        e @ ExportError::OtherContent { .. } => Failure::input(e),
         e => Failure::internal(e),
     }
 }
@@ -102,6 +138,7 @@ fn kinds(requested: &[ExportKind]) -> Vec<ExportKind> {
 /// Exports all formats except a bundle.
 fn files(
     args: &ExportArgs,
+    target: &Target,
     reader: &SessionReader,
     header: &RunHeader,
     folder: &Folder,
@@ -116,7 +153,11 @@ fn files(
     let tabular = |kind: &ExportKind| kind.is_tabular();
     let needed = kinds.iter().any(tabular) && tables.iter().any(|t| t.needs_analysis());
     let results = if needed {
-        let found = results::analyze_shown(&args.session, AnalysisRequest::default());
+        let choices = AnalysisRequest {
+            selection: target.selected.as_ref(),
+            ..AnalysisRequest::default()
+        };
+        let found = results::analyze_shown(&target.path, choices);
         Some(found.map_err(without_analysis)?)
     } else {
         None
@@ -228,17 +269,7 @@ pub(crate) fn derived(
     let mut results = results::analyze_shown(session, AnalysisRequest::default())?;
     // Measured on one machine at one time: it does not follow from the session.
     results.tradeoff = None;
-    let (json, html) = results::documents(&results)?;
-    let mut written = Vec::new();
-    for (ending, text) in [(".results.json", json), (".report.html", html)] {
-        let file = folder.write_atomic(ending, |to| {
-            std::fs::write(to, &text).map_err(|e| ExportError::File {
-                path: to.to_owned(),
-                found: e.to_string(),
-            })
-        });
-        written.push(file.map_err(refused)?);
-    }
+    let mut written = documents(&results, folder)?;
     let source = Source {
         reader,
         header,
@@ -255,13 +286,54 @@ pub(crate) fn derived(
     Ok(written)
 }
 
+/// Writes results and report.
+fn documents(results: &Results, folder: &Folder) -> Result<Vec<PathBuf>, Failure> {
+    let (json, html) = results::documents(results)?;
+    let mut written = Vec::new();
+    for (ending, text) in [(".results.json", json), (".report.html", html)] {
+        let file = folder.write_atomic(ending, |to| {
+            std::fs::write(to, &text).map_err(|e| ExportError::File {
+                path: to.to_owned(),
+                found: e.to_string(),
+            })
+        });
+        written.push(file.map_err(refused)?);
+    }
+    Ok(written)
+}
+
+/// Writes what an analysis adds to a session: results, report, and the tables of presses and results.
+///
+/// # Errors
+/// [`Failure::internal`] when a file cannot be written.
+pub(crate) fn results_and_tables(
+    results: &Results,
+    reader: &SessionReader,
+    header: &RunHeader,
+    folder: &Folder,
+) -> Result<Vec<PathBuf>, Failure> {
+    let mut written = documents(results, folder)?;
+    let source = Source {
+        reader,
+        header,
+        analysis: Some(analysis_and_legs(results)),
+    };
+    for kind in [ExportKind::Parquet, ExportKind::Csv] {
+        written.extend(one_kind(kind, &source, &BUNDLED[..2], folder).map_err(refused)?);
+    }
+    Ok(written)
+}
+
 /// The tables of a bundle.
 const BUNDLED: [TableName; 3] = [TableName::Presses, TableName::Results, TableName::Pose];
 /// Suffix of the file of tags and notes.
 pub(crate) const TAGS: &str = ".tags.jsonl";
 
 /// Writes the session, its results, camera streams and tables into a folder that `verify` can check.
-fn bundle(
+///
+/// # Errors
+/// [`Failure::input`] for a session without a seal; otherwise as [`derived`].
+pub(crate) fn bundle(
     session: &Path,
     reader: &SessionReader,
     header: &RunHeader,
@@ -312,6 +384,6 @@ fn bundle(
         &names,
     )
     .map_err(refused)?;
-    written.push(folder.path().join(skinrig_export::MANIFEST));
+    written.push(folder.path().join(MANIFEST));
     Ok(written)
 }

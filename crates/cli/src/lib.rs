@@ -6,6 +6,7 @@ mod terminal;
 
 mod analyses;
 pub mod analysis_request;
+mod analyze;
 mod args;
 mod catalogue;
 mod challenge;
@@ -24,6 +25,7 @@ mod host;
 mod import;
 mod inspect;
 mod jog;
+mod lake;
 pub mod library;
 mod looks;
 mod man;
@@ -35,6 +37,7 @@ mod phase;
 mod progress;
 mod prototypes;
 mod provenance;
+mod publish;
 mod recording;
 mod remote;
 pub mod results;
@@ -44,10 +47,12 @@ mod run;
 mod salvage;
 mod sample_size;
 mod schema;
+pub mod selection;
 mod sense;
 mod sessions;
 mod show;
 mod signals;
+mod signature;
 pub mod sink;
 mod status;
 mod subprocess;
@@ -133,14 +138,18 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Catalogue(a) => catalogue::catalogue(a, json),
         Command::Sessions(a) => sessions::sessions(a, json),
         Command::Show(a) => show::show(a, json),
-        Command::Analyze(a) => results::analyze(a, output),
-        Command::Report(a) => results::report(a, json),
+        Command::Analyze(a) => analyze::analyze(a, output),
+        Command::Report(a) => analyze::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, output),
         Command::Online(a) => online::online(a, output),
         Command::Verify(a) => verify::verify(a, json),
         Command::Salvage(a) => salvage::salvage(a, json),
         Command::Import(a) => import::import(a, &command_line(arguments), output),
+        Command::Select(a) => selection::select(a, json),
+        Command::Publish(a) => publish::publish(a, json),
+        Command::Reproduce(a) => publish::reproduce(a, json),
+        Command::Lake(a) => lake::lake(a, json),
         Command::Export(a) => export::export(a, json),
         Command::Challenge(a) => challenge::challenge(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),

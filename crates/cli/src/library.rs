@@ -16,7 +16,7 @@ use crate::exit::Failure;
 use crate::results;
 use crate::signals::Operator;
 use crate::terminal::Output;
-use crate::{analyses, check, compare, conclusion, run};
+use crate::{analyses, check, compare, conclusion, run, selection};
 
 pub use crate::view::Program;
 
@@ -75,7 +75,8 @@ pub fn variants(session: &Path, session_id: &str) -> Vec<String> {
     all.into_iter().filter_map(|found| found.name).collect()
 }
 
-/// Analyses a session; with `save` also writes the results and the report beside it, as `skinrig analyze` does.
+/// Analyses a session, or the one that a selection names; with `save` also writes the results and the report beside it, as
+/// `skinrig analyze` does.
 ///
 /// # Errors
 /// [`Failure::input`] for an unreadable session and for settings that do not parse; [`Failure::internal`] when a file
@@ -84,7 +85,12 @@ pub fn analyze(session: &Path, choices: AnalysisRequest<'_>, save: bool) -> Resu
     if let Some(name) = choices.name {
         analyses::parse(name).map_err(|e| Failure::input(format!("name `{name}`: {e}")))?;
     }
-    let results = results::analyze_session(session, choices)?;
+    let target = selection::sessions(session)?.one(session)?;
+    let choices = AnalysisRequest {
+        selection: target.selected.as_ref().or(choices.selection),
+        ..choices
+    };
+    let results = results::analyze_session(&target.path, choices)?;
     if save {
         results::write_results(&results, None, None)?;
     }

@@ -84,6 +84,7 @@ pub(crate) fn provenance(
         protocol_sha256: header.protocol_sha256.clone(),
         overrides: header.overrides.clone(),
         variant: None,
+        selection: None,
         plan_sha256: header.plan_sha256.clone(),
         seed: header.seed,
         rig_kind: header.rig_kind.clone(),

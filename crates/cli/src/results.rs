@@ -1,17 +1,15 @@
-//! `skinrig analyze` and `skinrig report`, and the last step of `run` and `import`: analyses a session and writes its results.
+//! Analyses a session, writes its results and prints them: for `analyze` and `report`, and as the last step of `run` and `import`.
 
 use std::path::{Path, PathBuf};
 
-use skinrig_analysis::digits::{self, Digits};
+use skinrig_analysis::digits::Digits;
 use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, LegStart};
-use skinrig_recorder::SessionReader;
-use skinrig_report::{Provenance, ReportInput, Variant};
+use skinrig_report::{Provenance, ReportInput, SelectionEffect, Variant};
 use skinrig_results::{AlignedSession, AnalyzedSession, Session};
 
 use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
-use crate::args::{AnalyzeArgs, ReportArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
 use crate::terminal::Output;
@@ -53,6 +51,7 @@ fn variant(choices: AnalysisRequest<'_>) -> Variant {
         changed: choices.overrides.to_vec(),
         reference_code: choices.reference_code,
         calibration_from: choices.calibration_from.map(Path::to_owned),
+        selection: choices.selection.map(|s| s.name.clone()),
     }
 }
 
@@ -65,7 +64,7 @@ pub(crate) fn open(
     choices: AnalysisRequest<'_>,
 ) -> Result<(AlignedSession, Option<Variant>), Failure> {
     let session = Session::open(path, choices.of_session())?;
-    let changes = session.is_changed || choices.name.is_some();
+    let changes = session.is_changed || choices.name.is_some() || choices.selection.is_some();
     let variant = changes.then(|| variant(choices));
     Ok((session.read_input()?.align(), variant))
 }
@@ -76,14 +75,41 @@ pub(crate) fn open(
 /// [`Failure::input`] for an unreadable session or settings that do not parse.
 pub fn analyze_session(path: &Path, choices: AnalysisRequest<'_>) -> Result<Results, Failure> {
     let (aligned, variant) = open(path, choices)?;
-    complete(path, aligned, variant)
+    let results = complete(path, aligned, variant)?;
+    with_effect(results, choices)
 }
 
 /// Like [`analyze_session`], with its progress on the terminal.
 pub(crate) fn analyze_shown(path: &Path, choices: AnalysisRequest<'_>) -> Result<Results, Failure> {
     let (aligned, variant) = open(path, choices)?;
-    let _phase = Phase::reading("analysing", aligned.events.bytes_read());
-    complete(path, aligned, variant)
+    let phase = Phase::reading("analysing", aligned.events.bytes_read());
+    let results = complete(path, aligned, variant)?;
+    drop(phase);
+    let _phase = Phase::begin("analysing without the selection");
+    with_effect(results, choices)
+}
+
+/// Adds what a selection changes: the same analysis without it, without studies.
+fn with_effect(mut results: Results, choices: AnalysisRequest<'_>) -> Result<Results, Failure> {
+    let Some(selected) = choices.selection else {
+        return Ok(results);
+    };
+    let without = AnalysisRequest {
+        selection: None,
+        ..choices
+    };
+    let rmse_without_mm = if selected.out.is_empty() {
+        results.analysis.scored.rmse_mm
+    } else {
+        let (mut aligned, _) = open(&results.session, without)?;
+        aligned.input.settings.study_presses = 0;
+        aligned.analyze()?.analysis.scored.rmse_mm
+    };
+    results.provenance.selection = Some(SelectionEffect {
+        excluded: selected.out.len() as u32,
+        rmse_without_mm,
+    });
+    Ok(results)
 }
 
 fn complete(
@@ -165,6 +191,22 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     })
 }
 
+/// The results for programs, with the paths of what was written.
+pub(crate) fn document_with_files(
+    results: &Results,
+    digits: Option<&Digits>,
+    paths: &(PathBuf, PathBuf),
+) -> serde_json::Value {
+    let mut document = skinrig_report::json(&results.report_input());
+    document["files"] = serde_json::json!({
+        "session": results.session, "results": paths.0, "report": paths.1,
+    });
+    if let Some(digits) = digits {
+        document["digits"] = serde_json::json!(digits);
+    }
+    document
+}
+
 /// Prints the answer, or all figures (`-v`), and the paths of what was written.
 /// With the true digits, if they were asked for.
 pub(crate) fn print_results(
@@ -174,19 +216,7 @@ pub(crate) fn print_results(
     paths: &(PathBuf, PathBuf),
 ) {
     if output.json {
-        let mut document = skinrig_report::json(&results.report_input());
-        if let Some(object) = document.as_object_mut() {
-            object.insert(
-                "files".into(),
-                serde_json::json!({
-                    "session": results.session, "results": paths.0, "report": paths.1,
-                }),
-            );
-            if let Some(digits) = digits {
-                object.insert("digits".into(), serde_json::json!(digits));
-            }
-        }
-        crate::terminal::print_json(&document);
+        crate::terminal::print_json(&document_with_files(results, digits, paths));
     } else {
         let color = crate::terminal::is_coloured(&std::io::stdout());
         let input = results.report_input();
@@ -239,50 +269,6 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
     }
 }
 
-/// `skinrig analyze`.
-///
-/// # Errors
-/// See [`analyze_session`], `write_results`, [`check_limit`].
-pub fn analyze(args: &AnalyzeArgs, output: Output) -> Outcome {
-    let choices = AnalysisRequest {
-        overrides: &args.overrides,
-        reference_code: args.reference_code,
-        name: args.name.as_deref(),
-        calibration_from: args.calibration_from.as_deref(),
-    };
-    let results = analyze_shown(&args.session, choices)?;
-    if let (Some(variant), Some(out)) = (&results.provenance.variant, &args.out) {
-        let official = analyses::results_path(&args.session, None);
-        not_official(&official, out, variant)?;
-    }
-    let html = args.out.as_ref().map(|out| out.with_extension("html"));
-    let older = replacement_note(&results, args.out.as_deref());
-    let paths = write_shown(&results, args.out.as_deref(), html.as_deref())?;
-    older.iter().for_each(|note| errln!("{note}"));
-    crate::catalogue::automatic::register(&args.session);
-    let valid = results.analysis.is_valid();
-    if args.digits.is_some() && !valid {
-        errln!("note: the session is INVALID: its numbers have no true digits to show");
-    }
-    let repetitions = args.digits.filter(|_| valid);
-    let digits = repetitions.map(|n| true_digits(&args.session, choices, n));
-    print_results(&results, digits.transpose()?.as_ref(), output, &paths);
-    check_limit(&results, args.max_rmse)
-}
-
-/// Digits of the results that hold when measured numbers move by one unit in the last place.
-fn true_digits(
-    path: &Path,
-    choices: AnalysisRequest<'_>,
-    repetitions: u32,
-) -> Result<Digits, Failure> {
-    let (aligned, _) = open(path, choices)?;
-    let phase = Phase::steps("repeating the analysis", repetitions);
-    let each = |finished| phase.step(finished);
-    digits::digits(&aligned.input, &aligned.events, repetitions, &each)
-        .map_err(|e| Failure::from(skinrig_results::ResultsError::from(e)))
-}
-
 /// Rejects `out` if the variant would replace the `official` results.
 pub(crate) fn not_official(official: &Path, out: &Path, variant: &Variant) -> Result<(), Failure> {
     let place = |path: &Path| {
@@ -297,53 +283,4 @@ pub(crate) fn not_official(official: &Path, out: &Path, variant: &Variant) -> Re
         out.display(),
         variant.name
     )))
-}
-
-/// A note if results of another version of the analysis are about to be replaced.
-fn replacement_note(results: &Results, out: Option<&Path>) -> Option<String> {
-    let name = results.provenance.variant.as_ref().map(|v| v.name.as_str());
-    let id = &results.provenance.session_id;
-    let before = analyses::summary(&results.session, id, name)
-        .ok()
-        .filter(|_| out.is_none())?;
-    let (then, now) = (before.analysis_version, results.analysis.version);
-    (then != now).then(|| {
-        format!(
-            "note: the results of analysis version {then} are replaced by those of version {now}"
-        )
-    })
-}
-
-/// `skinrig report`.
-///
-/// # Errors
-/// See [`analyze_session`], `write_results`.
-pub fn report(args: &ReportArgs, json: bool) -> Outcome {
-    let variant = match &args.analysis {
-        None => None,
-        Some(name) => {
-            let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
-            let id = reader.session_id().map_err(Failure::session)?;
-            Some(analyses::variant(&args.session, &id, name)?)
-        }
-    };
-    let choices = variant
-        .as_ref()
-        .map_or_else(AnalysisRequest::default, |v| AnalysisRequest {
-            overrides: &v.changed,
-            reference_code: v.reference_code,
-            name: Some(&v.name),
-            calibration_from: v.calibration_from.as_deref(),
-        });
-    let results = analyze_shown(&args.session, choices)?;
-    let older = replacement_note(&results, None);
-    let paths = write_shown(&results, None, args.out.as_deref())?;
-    older.iter().for_each(|note| errln!("{note}"));
-    crate::catalogue::automatic::register(&args.session);
-    if json {
-        crate::terminal::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));
-    } else {
-        outln!("{}", paths.1.display());
-    }
-    check_limit(&results, None)
 }

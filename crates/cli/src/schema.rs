@@ -13,6 +13,8 @@ pub(crate) fn schema(args: &SchemaArgs) -> Outcome {
         SchemaKind::Schedule => skinrig_protocol::schedule_schema_json(),
         SchemaKind::Rig => skinrig_protocol::rig_schema_json(),
         SchemaKind::Limits => skinrig_protocol::limits_schema_json(),
+        SchemaKind::Selection => skinrig_protocol::selection_schema_json(),
+        SchemaKind::Publication => skinrig_protocol::publication_schema_json(),
         SchemaKind::Suite => skinrig_protocol::suite_schema_json(),
     };
     crate::terminal::out(format_args!("{schema}"));

@@ -14,7 +14,7 @@ use skinrig_text::starts_with_style;
 
 /// How a command presents its result.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Output {
+pub(crate) struct Output {
     /// As JSON, for programs.
     pub json: bool,
     /// With all figures.

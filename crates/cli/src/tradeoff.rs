@@ -21,9 +21,11 @@ use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
 use crate::results::{not_official, open, write};
+use crate::selection;
 use crate::signals::on_ctrl_c;
 use crate::terminal::Output;
 use crate::tradeoff_file::FORMAT;
+use skinrig_report::Variant;
 
 /// CPU time of this thread, s.
 fn thread_cpu_s() -> f64 {
@@ -227,21 +229,23 @@ fn rig_in_words(header: &RunHeader) -> String {
 /// When the session cannot be analysed or a file cannot be written; [`Failure::limit`] when no choice meets a
 /// requirement.
 pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
+    let target = selection::sessions(&args.session)?.one(&args.session)?;
     let choices = AnalysisRequest {
         overrides: &args.overrides,
         reference_code: false,
         calibration_from: None,
         name: None,
+        selection: target.selected.as_ref(),
     };
-    let (aligned, variant) = open(&args.session, choices)?;
+    let (aligned, variant) = open(&target.path, choices)?;
     if let (Some(variant), Some(out)) = (&variant, &args.out) {
-        not_official(&tradeoff_path(&args.session, None), out, variant)?;
+        not_official(&tradeoff_path(&target.path, None), out, variant)?;
     }
     let mut rig = rig_in_words(&aligned.session.header);
     if let Some(variant) = &variant {
         rig += &format!(
             " Not the session's own settings: {}.",
-            variant.changed.join(", ")
+            variant.changes_with_selection()
         );
     }
     let plan = Plan {
@@ -289,10 +293,10 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     let html_path = args
         .out
         .clone()
-        .unwrap_or_else(|| tradeoff_path(&args.session, variant.as_ref().map(|v| v.name.as_str())));
+        .unwrap_or_else(|| tradeoff_path(&target.path, variant.as_ref().map(|v| v.name.as_str())));
     let json_path = html_path.with_extension("json");
-    let name = args
-        .session
+    let name = target
+        .path
         .file_name()
         .map(|n| n.to_string_lossy().into_owned());
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
@@ -303,7 +307,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         document["files"] = serde_json::json!({ "page": html_path, "results": json_path });
         crate::terminal::print_json(&document);
     } else {
-        let own = variant.as_ref().map(|v| v.changed.join(", "));
+        let own = variant.as_ref().map(Variant::changes_with_selection);
         recommendations
             .iter()
             .for_each(|a| print_recommendation(a, own.as_deref(), &result.predictions));

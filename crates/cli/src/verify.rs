@@ -4,61 +4,68 @@ use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use skinrig_export::{BundleReport, Folder, same_bytes, verify_bundle};
-use skinrig_recorder::{PressTally, Problem, RecorderError, SessionReader, verify as recheck};
+use skinrig_analysis::Analysis;
+use skinrig_export::{BundleReport, Folder, MANIFEST, same_bytes, verify_bundle};
+use skinrig_recorder::{
+    PressTally, Problem, RecorderError, SessionReader, VerifyReport, verify as recheck,
+};
 
-use crate::args::SessionArg;
+use crate::analyses;
+use crate::args::VerifyArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
+use crate::paths::{SESSION_SUFFIX, beside};
 use crate::phase::Phase;
+use crate::selection;
+use crate::signature;
 use skinrig_results::Rescan;
 
 /// Recomputes everything in a session, and compares the files of a bundle with its manifest.
 ///
 /// # Errors
 /// [`Failure::input`] if the file is not a session or the folder is not a bundle; [`Failure::limit`] if something does not match.
-pub(crate) fn verify(args: &SessionArg, json: bool) -> Outcome {
+pub(crate) fn verify(args: &VerifyArgs, json: bool) -> Outcome {
     if args.session.is_dir() {
-        return bundle(&args.session, json);
+        return bundle(&args.session, args.signers.as_deref(), json);
     }
-    session(&args.session, json)
+    if let Some(signers) = &args.signers {
+        return Err(Failure::input(format!(
+            "--signers {}: expected the folder of a bundle, found a file\n  next: leave --signers out, or export a bundle with --sign",
+            signers.display()
+        )));
+    }
+    // Reading a selection compares its hashes with the seals; this compares the seals with the content.
+    let targets = selection::sessions(&args.session)?;
+    let mut documents = Vec::new();
+    let all = targets.each(|target| {
+        let report = check(&target.path)?;
+        let name = target.path.display();
+        if json {
+            documents.push(document(&target.path, &report));
+        } else {
+            print(&name, &report);
+        }
+        outcome(&name, &report)
+    });
+    if json {
+        targets.print(documents);
+    }
+    all
 }
 
 /// Checks every file of a bundle, then its session.
-fn bundle(folder: &Path, json: bool) -> Outcome {
-    let mut report = verify_bundle(folder).map_err(Failure::input)?;
-    if report.problems.is_empty() {
-        let inside = folder.join(&report.session);
-        let id = SessionReader::open(&inside).and_then(|reader| reader.session_id());
-        let id = id.map_err(Failure::session)?;
-        if id != report.session_id {
-            let expected = format!("session {}", report.session_id);
-            report
-                .problems
-                .push(Problem::new(&report.session, expected, id));
-        }
-        let session = recheck::<Rescan>(&inside).map_err(Failure::session)?;
-        report.more_problems = session.more_problems;
-        report
-            .problems
-            .extend(session.problems.into_iter().map(|problem| Problem {
-                place: format!("{}: {}", report.session, problem.place),
-                ..problem
-            }));
-        // A manifest can be forged, the session's seal cannot: everything else must follow from the session.
-        if report.problems.is_empty() {
-            report
-                .problems
-                .extend(compare_with_rebuilt(folder, &report)?);
-        }
-    }
+fn bundle(folder: &Path, signers: Option<&Path>, json: bool) -> Outcome {
+    let signature = signature::verify(&folder.join(MANIFEST), signers)?;
+    let report = check_bundle(folder, &Scratch::new()?, Derivation::OfIntact)?.report;
     let name = folder.display();
     let problems = report.problems.len() as u64 + report.more_problems;
     if json {
         let mut shown = serde_json::to_value(&report).map_err(Failure::internal)?;
         shown["sound"] = (problems == 0).into();
+        shown["signature"] = serde_json::to_value(&signature).map_err(Failure::internal)?;
         crate::terminal::print_json(&shown);
     } else {
+        signature.iter().for_each(|s| outln!("{name}: {s}"));
         print_problems(&name, &report.problems, report.more_problems);
         if problems == 0 {
             outln!(
@@ -80,26 +87,88 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
     }
 }
 
-/// Derives the files of a bundle from its session again, in a scratch folder, and compares them with the bundle's.
-fn compare_with_rebuilt(folder: &Path, report: &BundleReport) -> Result<Vec<Problem>, Failure> {
-    let place = scratch()?;
-    let found = compare_rebuilt_files(folder, report, &place);
-    // Leftovers in the scratch folder are not a fault of the bundle.
-    let _ = std::fs::remove_dir_all(&place);
-    found
+/// When to derive the files of a bundle from its session again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Derivation {
+    /// If all files are those of the manifest.
+    OfIntact,
+    /// If the session is intact.
+    Always,
 }
 
-fn compare_rebuilt_files(
+/// A bundle, and what follows from its session.
+pub(crate) struct CheckedBundle {
+    pub report: BundleReport,
+    /// Hash of the session's seal; empty if the session is damaged.
+    pub content_sha256: String,
+    /// The official analysis, derived again; `None` if the session is damaged.
+    pub analysis: Option<Analysis>,
+}
+
+/// Compares a bundle with its manifest, its session with the seal, and the other files with what follows from the session.
+///
+/// # Errors
+/// [`Failure::input`] if the folder is not a bundle.
+pub(crate) fn check_bundle(
+    folder: &Path,
+    scratch: &Scratch,
+    derivation: Derivation,
+) -> Result<CheckedBundle, Failure> {
+    let mut report = verify_bundle(folder).map_err(Failure::input)?;
+    let is_intact =
+        |report: &BundleReport| report.problems.iter().all(|p| p.place != report.session);
+    let mut checked = CheckedBundle {
+        content_sha256: String::new(),
+        analysis: None,
+        report: report.clone(),
+    };
+    if !is_intact(&report) || (derivation == Derivation::OfIntact && !report.problems.is_empty()) {
+        return Ok(checked);
+    }
+    let inside = folder.join(&report.session);
+    let reader = SessionReader::open(&inside).map_err(Failure::session)?;
+    let id = reader.session_id().map_err(Failure::session)?;
+    let seal = reader.seal().map_err(Failure::session)?;
+    drop(reader);
+    let mut wrong = Vec::new();
+    if id != report.session_id {
+        let expected = format!("session {}", report.session_id);
+        wrong.push(Problem::new(&report.session, expected, &id));
+    }
+    let session = recheck::<Rescan>(&inside).map_err(Failure::session)?;
+    report.more_problems = session.more_problems;
+    wrong.extend(session.problems.into_iter().map(|problem| Problem {
+        place: format!("{}: {}", report.session, problem.place),
+        ..problem
+    }));
+    // A manifest can be forged, the session's seal cannot: everything else must follow from the session.
+    if wrong.is_empty() {
+        let rebuilt = compare_with_rebuilt(folder, &report, scratch)?;
+        report.problems.extend(rebuilt);
+        let stem = beside(&inside, "");
+        let stem = stem.file_name().unwrap_or_default().to_string_lossy();
+        let copy = scratch.path().join(format!("{stem}{SESSION_SUFFIX}"));
+        checked.analysis = analyses::stored(&copy, &id, None);
+        let hex = |hash: [u8; 32]| hash.iter().map(|b| format!("{b:02x}")).collect();
+        checked.content_sha256 = seal.map_or_else(String::new, |s| hex(s.tree_sha256));
+    }
+    report.problems.extend(wrong);
+    checked.report = report;
+    Ok(checked)
+}
+
+/// Derives the files of a bundle from its session again, in the scratch folder, and compares them with the bundle's.
+fn compare_with_rebuilt(
     folder: &Path,
     report: &BundleReport,
-    place: &Path,
+    place: &Scratch,
 ) -> Result<Vec<Problem>, Failure> {
     let inside = folder.join(&report.session);
     let reader = SessionReader::open(&inside).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
-    let stem = crate::paths::beside(&inside, "");
+    let stem = beside(&inside, "");
     let stem = stem.file_name().unwrap_or_default().to_string_lossy();
-    let scratch = Folder::new(place, &stem, false).map_err(Failure::internal)?;
+    let scratch = Folder::new(place.path(), &stem, false).map_err(Failure::internal)?;
     let made = export::derived(&inside, &reader, &header, &scratch)?;
     let software = crate::version::SOFTWARE;
     let mut known = BTreeSet::from([report.session.clone(), format!("{stem}{}", export::TAGS)]);
@@ -111,7 +180,9 @@ fn compare_rebuilt_files(
             .to_string_lossy()
             .into_owned();
         let bundled = folder.join(&name);
-        if !report.names.contains(&name) {
+        if report.problems.iter().any(|p| p.place == name) {
+            // The manifest already tells that it is missing or another one.
+        } else if !report.names.contains(&name) {
             problems.push(Problem::new(&name, "this file", "none"));
         } else if !same_bytes(&file, &bundled).map_err(Failure::internal)? {
             problems.push(Problem::new(
@@ -144,21 +215,40 @@ fn print_problems(name: &impl Display, problems: &[Problem], more: u64) {
     }
 }
 
-/// Creates a scratch folder.
-fn scratch() -> Result<PathBuf, Failure> {
-    let place = std::env::temp_dir();
-    for n in 0..1000 {
-        let folder = place.join(format!("skinrig-verify-{}-{n}", std::process::id()));
-        match std::fs::create_dir(&folder) {
-            Ok(()) => return Ok(folder),
-            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
-            Err(e) => return Err(Failure::internal(format!("{}: {e}", folder.display()))),
+/// A scratch folder, removed at the end.
+pub(crate) struct Scratch(PathBuf);
+
+impl Scratch {
+    /// Creates a folder with a new name.
+    ///
+    /// # Errors
+    /// [`Failure::internal`] when the folder for temporary files cannot be used.
+    pub(crate) fn new() -> Result<Self, Failure> {
+        let place = std::env::temp_dir();
+        for n in 0..1000 {
+            let folder = place.join(format!("skinrig-verify-{}-{n}", std::process::id()));
+            match std::fs::create_dir(&folder) {
+                Ok(()) => return Ok(Self(folder)),
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(e) => return Err(Failure::internal(format!("{}: {e}", folder.display()))),
+            }
         }
+        Err(Failure::internal(format!(
+            "{}: expected to create a scratch folder, found all 1000 names taken",
+            place.display()
+        )))
     }
-    Err(Failure::internal(format!(
-        "{}: expected to create a scratch folder, found all 1000 names taken",
-        place.display()
-    )))
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // Leftovers are not a fault of what was checked.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
 }
 
 /// Number of presses made, and of planned ones where they differ.
@@ -172,41 +262,46 @@ fn presses(presses: PressTally, sync: PressTally) -> String {
     }
 }
 
-fn session(path: &Path, json: bool) -> Outcome {
+/// Recomputes everything in a session.
+fn check(path: &Path) -> Result<VerifyReport, Failure> {
     if let Err(e @ RecorderError::NotASession { .. }) = SessionReader::open(path) {
         return Err(Failure::session(e));
     }
-    let phase = Phase::begin("checking every byte");
-    let report = recheck::<Rescan>(path).map_err(Failure::session)?;
-    drop(phase);
-    let name = path.display();
-    if json {
-        crate::terminal::print_json(&serde_json::json!({
-            "session": path, "sound": report.is_sound(), "sealed": report.sealed,
-            "problems": report.problems, "more_problems": report.more_problems, "remarks": report.remarks,
-            "totals": report.totals,
-        }));
-    } else {
-        print_problems(&name, &report.problems, report.more_problems);
-        for remark in &report.remarks {
-            outln!("{name}: note: {remark}");
-        }
-        if let (true, Some(t)) = (report.is_sound(), report.totals) {
-            outln!(
-                "{name}: sound{}; {}, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
-                if report.sealed {
-                    ", sealed"
-                } else {
-                    ", but not sealed: camera bytes, poses and counts were checked, not every byte"
-                },
-                presses(t.presses, t.sync),
-                t.cd_events,
-                t.chunks,
-                t.raw_bytes as f64 / 1e6,
-                t.pose_samples
-            );
-        }
+    let _phase = Phase::begin("checking every byte");
+    recheck::<Rescan>(path).map_err(Failure::session)
+}
+
+fn document(path: &Path, report: &VerifyReport) -> serde_json::Value {
+    serde_json::json!({
+        "session": path, "sound": report.is_sound(), "sealed": report.sealed,
+        "problems": report.problems, "more_problems": report.more_problems, "remarks": report.remarks,
+        "totals": report.totals,
+    })
+}
+
+fn print(name: &impl Display, report: &VerifyReport) {
+    print_problems(name, &report.problems, report.more_problems);
+    for remark in &report.remarks {
+        outln!("{name}: note: {remark}");
     }
+    if let (true, Some(t)) = (report.is_sound(), report.totals) {
+        outln!(
+            "{name}: sound{}; {}, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
+            if report.sealed {
+                ", sealed"
+            } else {
+                ", but not sealed: camera bytes, poses and counts were checked, not every byte"
+            },
+            presses(t.presses, t.sync),
+            t.cd_events,
+            t.chunks,
+            t.raw_bytes as f64 / 1e6,
+            t.pose_samples
+        );
+    }
+}
+
+fn outcome(name: &impl Display, report: &VerifyReport) -> Outcome {
     if report.is_sound() {
         Ok(Exit::Ok)
     } else {

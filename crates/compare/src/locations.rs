@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use skinrig_analysis::result::PressResult;
-use skinrig_analysis::rule::Rule;
 use skinrig_model::{Point2, PressRole, Verdict};
 
 use crate::subject::{Session, Subject};
@@ -144,6 +143,6 @@ fn is_attempt(press: &PressResult) -> bool {
     let by_journal = press.verdict == Verdict::Excluded
         && !press
             .rule()
-            .is_some_and(|rule| rule == Rule::ByHand || rule.is_on_data());
+            .is_some_and(|rule| rule.is_by_hand() || rule.is_on_data());
     press.role == PressRole::Score && press.verdict != Verdict::Missed && !by_journal
 }

@@ -13,6 +13,8 @@ use crate::error::ExportError;
 
 /// Manifest of a bundle, which lists the other files.
 pub const MANIFEST: &str = "manifest.json";
+/// Added to the name of [`MANIFEST`] or of a crate's description, for its signature.
+pub const SIGNATURE_ENDING: &str = ".sig";
 /// Value of the manifest's `format` field.
 const FORMAT: &str = "skinrig-bundle";
 /// Version of the manifest's layout.
@@ -31,11 +33,12 @@ struct Manifest {
     files: Vec<Entry>,
 }
 
+/// A file with its size and hash.
 #[derive(Debug, Serialize, Deserialize)]
-struct Entry {
-    name: String,
-    bytes: u64,
-    sha256: String,
+pub(crate) struct Entry {
+    pub(crate) name: String,
+    pub(crate) bytes: u64,
+    pub(crate) sha256: String,
 }
 
 /// Content of a bundle, and its problems.
@@ -91,8 +94,8 @@ pub fn seal_bundle(
         .map_err(ExportError::file(&path))
 }
 
-/// Manifest entry of a file in its present state.
-fn entry(folder: &Path, name: &str) -> Result<Entry, ExportError> {
+/// Entry of a file in its present state.
+pub(crate) fn entry(folder: &Path, name: &str) -> Result<Entry, ExportError> {
     let path = folder.join(name);
     let io_error = ExportError::file(&path);
     let mut file = File::open(&path).map_err(&io_error)?;
@@ -183,7 +186,8 @@ pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
     for other in std::fs::read_dir(folder).map_err(ExportError::file(folder))? {
         let name = other.map_err(ExportError::file(folder))?.file_name();
         let name = name.to_string_lossy();
-        if name != MANIFEST && !listed.contains(&*name) {
+        let is_signature = name.strip_suffix(SIGNATURE_ENDING) == Some(MANIFEST);
+        if name != MANIFEST && !is_signature && !listed.contains(&*name) {
             problems.push(Problem::new(
                 name,
                 "only files listed in the manifest",

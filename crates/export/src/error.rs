@@ -37,6 +37,26 @@ pub enum ExportError {
         /// Number of rows found.
         found: u64,
     },
+    /// A lake has the session with another content.
+    #[error(
+        "{}: expected the content of session {session_id} as the lake has it, found another: the session was resumed, or it is \
+         another bench's\n  next: choose another lake, or remove the session's files from this one",
+        path.display()
+    )]
+    OtherContent {
+        /// Its commit.
+        path: PathBuf,
+        /// The session.
+        session_id: String,
+    },
+    /// The folder is not an RO-Crate.
+    #[error("{}: expected an RO-Crate 1.1, found {found}\n  next: create one with `skinrig publish`", path.display())]
+    NotACrate {
+        /// Its description.
+        path: PathBuf,
+        /// Why it is not one.
+        found: String,
+    },
     /// The folder is not a bundle.
     #[error("{}: expected a bundle, found {found}\n  next: create one with `skinrig export SESSION --to bundle`", path.display())]
     NotABundle {

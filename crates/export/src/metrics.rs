@@ -7,23 +7,30 @@ use crate::source::{Source, TableName};
 use crate::table::{Table, Values};
 
 /// A metric of a set of presses.
-struct Row {
-    set: &'static str,
-    metric: &'static str,
-    unit: &'static str,
-    depth_mm: f64,
-    estimate: Estimate,
+#[derive(Debug, Clone, Copy)]
+pub struct MetricRow {
+    /// Set of presses, for example `scored`.
+    pub set: &'static str,
+    /// For example `rmse`.
+    pub metric: &'static str,
+    /// `mm`, or `1` for a share.
+    pub unit: &'static str,
+    /// Of the presses at one depth; `None`: at all.
+    pub depth_mm: Option<f64>,
+    /// Value with its interval.
+    pub estimate: Estimate,
 }
 
 /// Builds the table of a session; no rows without an analysis.
 pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     let rows = source
         .analysis
-        .map_or_else(Vec::new, |(analysis, _)| rows(analysis));
+        .map_or_else(Vec::new, |(analysis, _)| metric_rows(analysis));
     let session_id = source.reader.session_id()?;
-    let text =
-        |of: &dyn Fn(&Row) -> String| Values::Text(rows.iter().map(|r| Some(of(r))).collect());
-    let real = |of: &dyn Fn(&Row) -> Option<f64>| {
+    let text = |of: &dyn Fn(&MetricRow) -> String| {
+        Values::Text(rows.iter().map(|r| Some(of(r))).collect())
+    };
+    let real = |of: &dyn Fn(&MetricRow) -> Option<f64>| {
         Values::Real(rows.iter().map(|r| of(r).unwrap_or(f64::NAN)).collect())
     };
     let columns = [
@@ -32,7 +39,7 @@ pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
         ("set", text(&|r| r.set.to_owned())),
         ("metric", text(&|r| r.metric.to_owned())),
         ("unit", text(&|r| r.unit.to_owned())),
-        ("depth_mm", real(&|r| Some(r.depth_mm))),
+        ("depth_mm", real(&|r| r.depth_mm)),
         ("value", real(&|r| r.estimate.value)),
         ("low", real(&|r| r.estimate.low)),
         ("high", real(&|r| r.estimate.high)),
@@ -49,30 +56,32 @@ pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     })
 }
 
-fn rows(analysis: &Analysis) -> Vec<Row> {
+/// The metrics of an analysis, as the table of results has them.
+#[must_use]
+pub fn metric_rows(analysis: &Analysis) -> Vec<MetricRow> {
     let mut rows = of_set("scored", &analysis.scored);
-    rows.extend(analysis.depths.iter().map(|depth| Row {
+    rows.extend(analysis.depths.iter().map(|depth| MetricRow {
         set: "scored",
         metric: "rmse",
         unit: "mm",
-        depth_mm: depth.depth_mm,
+        depth_mm: Some(depth.depth_mm),
         estimate: depth.rmse_mm,
     }));
     rows.extend(of_set(
         "scored_without_exclusions",
         &analysis.scored_without_exclusions,
     ));
-    rows.push(Row {
+    rows.push(MetricRow {
         set: "penalised",
         metric: "rmse",
         unit: "mm",
-        depth_mm: f64::NAN,
+        depth_mm: None,
         estimate: analysis.penalised.rmse_mm,
     });
     rows
 }
 
-fn of_set(set: &'static str, m: &Metrics) -> Vec<Row> {
+fn of_set(set: &'static str, m: &Metrics) -> Vec<MetricRow> {
     let all = [
         ("rmse", "mm", m.rmse_mm),
         ("rmse_x", "mm", m.rmse_x_mm),
@@ -86,11 +95,11 @@ fn of_set(set: &'static str, m: &Metrics) -> Vec<Row> {
         ("within_rate", "1", m.within_rate),
     ];
     all.into_iter()
-        .map(|(metric, unit, estimate)| Row {
+        .map(|(metric, unit, estimate)| MetricRow {
             set,
             metric,
             unit,
-            depth_mm: f64::NAN,
+            depth_mm: None,
             estimate,
         })
         .collect()

@@ -27,6 +27,7 @@ mod remount;
 mod rig_fault;
 pub mod run_end;
 pub mod scene;
+pub mod selection;
 pub mod settings;
 pub mod skin;
 pub mod stopping;
@@ -65,6 +66,7 @@ pub use remount::RemountSettings;
 pub use rig_fault::{RigFault, UnsupportedFault};
 pub use run_end::{RunEnd, StopReason};
 pub use scene::{SceneNeed, SimLevel};
+pub use selection::{SelectedOut, SelectionReason};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
     Estimator, LatencySettings, Locator, Precision, ReducedLatencySettings, ReducedThresholdGrid,

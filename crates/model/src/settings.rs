@@ -7,6 +7,7 @@ use crate::camera::StereoGeometry;
 use crate::id::PressId;
 use crate::lens::LensKind;
 use crate::remount::RemountSettings;
+use crate::selection::{SelectedOut, SelectionReason};
 use crate::skin::SkinOutline;
 
 /// Times are kept in whole nanoseconds.
@@ -421,6 +422,10 @@ pub struct AnalysisSettings {
     /// Presses excluded by hand, by their number in the report (from 1, sync presses counted).
     #[setting(default = "[]")]
     pub exclude_press_numbers: Vec<PressId>,
+    /// Presses excluded by a selection, each at most once.
+    #[setting(skip)]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub selected_out: Vec<SelectedOut>,
     /// In recordings of earlier versions only: presses excluded by hand, counted from 0. New files use `exclude_press_numbers`.
     #[doc(hidden)]
     #[serde(skip)]
@@ -533,10 +538,17 @@ impl AnalysisSettings {
     /// Sides of the bins of pixels that divide both sides of the sensor, px.
     pub const BIN_SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
 
-    /// True for a press that is excluded by hand.
+    /// True for a press that is excluded by hand, without a selection.
     #[must_use]
     pub fn excludes(&self, press: PressId) -> bool {
         self.exclude_press_numbers.contains(&press)
+    }
+
+    /// Why a selection excludes the press; `None` if it does not.
+    #[must_use]
+    pub fn selected_out(&self, press: PressId) -> Option<&SelectionReason> {
+        let found = self.selected_out.iter().find(|s| s.press == press);
+        found.map(|s| &s.why)
     }
 
     fn finish(mut self, field: &Field, out: &mut Collector) -> Option<Self> {

@@ -72,6 +72,20 @@ impl SkinModel {
         ))
     }
 
+    /// The same for a recording of the skin that is played this much faster (at least 1).
+    #[must_use]
+    pub fn played_faster(&self, factor: f64) -> Self {
+        let faster = |fit: ClockFit| ClockFit {
+            offset_us: fit.offset_us / factor,
+            ..fit
+        };
+        Self {
+            clocks: self.clocks.map(faster),
+            touches: self.touches.thinned(factor),
+            ..self.clone()
+        }
+    }
+
     /// Clock fit of each camera.
     #[must_use]
     pub const fn clocks(&self) -> &[ClockFit; 2] {

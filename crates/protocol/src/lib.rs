@@ -7,9 +7,10 @@
 //! 4. [`Plan::summary`] and [`path_svg`] display it.
 //!
 //! [`Schedule`] describes a recording made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] the margins
-//! of a comparison; [`Suite`] the checks of a bench. The settings structs declare the keys of each
+//! of a comparison; [`Selection`] the sessions and presses of a result; [`Publication`] what published data
+//! state; [`Suite`] the checks of a bench. The settings structs declare the keys of each
 //! language and yield its JSON Schema ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`],
-//! [`suite_schema_json`]).
+//! [`selection_schema_json`], [`publication_schema_json`], [`suite_schema_json`]).
 
 pub mod area;
 mod assemble;
@@ -27,12 +28,14 @@ mod path;
 mod phases;
 pub mod plan;
 pub mod protocol;
+pub mod publication;
 mod reference_code;
 mod remaining;
 mod retakes;
 pub mod rig;
 pub mod schedule;
 mod schema;
+pub mod selection;
 pub mod stop;
 pub mod suite;
 pub mod summary;
@@ -52,15 +55,17 @@ pub use online::{Online, React};
 pub use phases::PressPhases;
 pub use plan::{Plan, PressStep, RunLimits, Step, TripReaction};
 pub use protocol::{CameraRequest, Motion, Pace, Protocol, Prototype, Scene, SimulatedSkin, Sync};
+pub use publication::Publication;
 pub use reference_code::REFERENCE_CODE;
 pub use remaining::Route;
 pub use retakes::Retakes;
 pub use rig::{RigFile, RigKind};
 pub use schedule::Schedule;
 pub use schema::{
-    limits_schema_json, rig_schema_json, schedule_schema_json, schema_json, setting_doc,
-    suite_schema_json,
+    limits_schema_json, publication_schema_json, rig_schema_json, schedule_schema_json,
+    schema_json, selection_schema_json, setting_doc, suite_schema_json,
 };
+pub use selection::Selection;
 pub use skinrig_settings::{Diagnostic, Diagnostics, Location};
 pub use stop::{DeclaredStop, Stop};
 pub use suite::Suite;

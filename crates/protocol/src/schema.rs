@@ -1,4 +1,4 @@
-//! JSON Schemas (draft 2020-12) of the five languages, from their tables.
+//! JSON Schemas (draft 2020-12) of the languages, from their tables.
 
 use std::collections::BTreeMap;
 
@@ -27,6 +27,21 @@ pub fn rig_schema_json() -> String {
 #[must_use]
 pub fn limits_schema_json() -> String {
     render(crate::limits::Limits::TABLE, "skinrig limits")
+}
+
+/// The JSON Schema of a selection, as `skinrig select` writes it.
+#[must_use]
+pub fn selection_schema_json() -> String {
+    render(crate::selection::Selection::TABLE, "skinrig selection")
+}
+
+/// The JSON Schema of what a publication states, for `skinrig publish --about`.
+#[must_use]
+pub fn publication_schema_json() -> String {
+    render(
+        crate::publication::Publication::TABLE,
+        "skinrig publication",
+    )
 }
 
 /// The JSON Schema of a suite for `skinrig hil run`.

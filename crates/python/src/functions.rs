@@ -17,7 +17,7 @@ use crate::options::{overrides, to_python};
 /// Python hears of ctrl-C this often during a simulation.
 const LISTEN_EVERY: Duration = Duration::from_millis(100);
 
-/// Analyses a session and returns the results, as `skinrig analyze` does.
+/// Analyses a session, or the one that a selection names, and returns the results, as `skinrig analyze` does.
 ///
 /// `settings` are the keys and values of `--set`, for example `{"analysis.min_samples": 5}`. With `save` the results and the
 /// report are written beside the session, those of other settings as a variant with the name `name`. `calibration_from` is an
@@ -40,6 +40,7 @@ pub(crate) fn analyze<'py>(
             reference_code,
             name: name.as_deref(),
             calibration_from: calibration_from.as_deref(),
+            selection: None,
         };
         library::analyze(&path, choices, save).map(|document| document.to_string())
     });

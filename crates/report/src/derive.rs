@@ -213,7 +213,7 @@ pub(crate) fn rmse_at_look(analysis: &Analysis) -> Option<RmseAtLook> {
 
 /// A note if the geometry differs from the one in the settings: nominal, or a smaller model. `None` without presses.
 #[must_use]
-pub(crate) fn geometry_note(analysis: &Analysis) -> Option<String> {
+pub fn geometry_note(analysis: &Analysis) -> Option<String> {
     use skinrig_model::CalibrationModel::{Auto, None as Nominal};
     let requested = analysis.settings.calibration;
     if analysis.presses.is_empty() {

@@ -6,7 +6,7 @@ use skinrig_analysis::result::{Estimate, PressCounts};
 
 use crate::comparison;
 use crate::input::ReportInput;
-use crate::provenance::Variant;
+use crate::provenance::{SelectionEffect, Variant};
 
 /// Value of the document's `format` field.
 pub(crate) const JSON_FORMAT: &str = "skinrig-report";
@@ -30,6 +30,9 @@ pub struct Summary {
     /// Differences from the session's own settings; `None` for the official analysis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<Variant>,
+    /// What the selection of the variant changes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selection: Option<SelectionEffect>,
     /// Settings overridden when the session was recorded, as `key=value`.
     #[serde(default)]
     pub overrides: Vec<String>,
@@ -56,6 +59,7 @@ impl Summary {
             session_id: input.provenance.session_id.clone(),
             analysis_version: analysis.version,
             variant: input.provenance.variant.clone(),
+            selection: input.provenance.selection.clone(),
             overrides: input.provenance.overrides.clone(),
             results_hash: input.provenance.results_hash.clone(),
             valid: analysis.is_valid(),

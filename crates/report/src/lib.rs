@@ -31,13 +31,15 @@ mod input;
 mod json;
 mod markup;
 mod plot;
+mod selection;
 mod tables;
 mod terminal;
 
 pub use input::ReportInput;
 pub use json::{JSON_VERSION, Summary};
 pub use provenance::{
-    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow, Variant,
+    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow, SelectionEffect,
+    SelectionName, Variant,
 };
 
 /// The whole report as a self-contained HTML page.

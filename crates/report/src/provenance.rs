@@ -5,6 +5,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use skinrig_analysis::result::Estimate;
 use skinrig_model::level_bias::{LevelBias, SceneFigure};
 use skinrig_model::{InvalidReason, LostTime, PreflightCheck, RunEnd};
 
@@ -30,6 +31,9 @@ pub struct Provenance {
     /// Differences from the session's own settings; `None` for the official analysis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<Variant>,
+    /// What the selection of the variant changes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selection: Option<SelectionEffect>,
     /// Seed of the run.
     pub seed: u64,
     /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
@@ -94,33 +98,77 @@ pub struct Variant {
     /// Session whose calibration it corrects.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_from: Option<PathBuf>,
+    /// Selection whose exclusions apply.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selection: Option<SelectionName>,
+}
+
+/// A selection of sessions and presses.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SelectionName {
+    /// Its name.
+    pub name: String,
+    /// Lower-case hex SHA-256 of its text.
+    pub sha256: String,
+    /// Its file.
+    pub file: PathBuf,
+}
+
+impl fmt::Display for SelectionName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let short = self.sha256.get(..12).unwrap_or(&self.sha256);
+        write!(f, "`{}` (SHA-256 {short})", self.name)
+    }
+}
+
+/// What a selection changes in a session.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SelectionEffect {
+    /// Number of presses that it excludes.
+    pub excluded: u32,
+    /// RMSE of the scored presses without the selection, all else equal.
+    pub rmse_without_mm: Estimate,
+}
+
+impl Variant {
+    /// What it changes besides the selection; `None` for nothing.
+    #[must_use]
+    pub fn changes(&self) -> Option<String> {
+        let reference = self.reference_code;
+        let reference = reference.then(|| "the choices of the public code".to_owned());
+        let earlier = self.calibration_from.as_ref();
+        let earlier = earlier.map(|session| format!("the calibration of {}", session.display()));
+        let all = reference
+            .into_iter()
+            .chain(earlier)
+            .chain(self.changed.iter().cloned());
+        let all = all.collect::<Vec<_>>().join(", ");
+        (!all.is_empty()).then_some(all)
+    }
+
+    /// Everything that it changes.
+    #[must_use]
+    pub fn changes_with_selection(&self) -> String {
+        let selection = self
+            .selection
+            .as_ref()
+            .map(|s| format!("the selection {s}"));
+        let all: Vec<String> = selection.into_iter().chain(self.changes()).collect();
+        match &all[..] {
+            [] => "no changed settings".to_owned(),
+            all => all.join(", "),
+        }
+    }
 }
 
 impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = &self.name;
+        let changes = self.changes_with_selection();
         write!(
             f,
-            "analysis `{}`, not the session's own settings: ",
-            self.name
-        )?;
-        if self.reference_code {
-            f.write_str("the choices of the public code")?;
-            if !self.changed.is_empty() || self.calibration_from.is_some() {
-                f.write_str(", ")?;
-            }
-        }
-        if let Some(session) = &self.calibration_from {
-            write!(f, "the calibration of {}", session.display())?;
-            if !self.changed.is_empty() {
-                f.write_str(", ")?;
-            }
-        }
-        match &self.changed[..] {
-            [] if !self.reference_code && self.calibration_from.is_none() => {
-                f.write_str("no changed settings")
-            }
-            changed => f.write_str(&changed.join(", ")),
-        }
+            "analysis `{name}`, not the session's own settings: {changes}"
+        )
     }
 }
 

@@ -29,6 +29,7 @@ pub(crate) fn calibration(
     }
     earlier.settings = AnalysisSettings {
         exclude_press_numbers: earlier.settings.exclude_press_numbers,
+        selected_out: Vec::new(),
         study_presses: 0,
         ..session.settings.clone()
     };

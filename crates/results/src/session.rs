@@ -41,7 +41,10 @@ impl Session {
                 path: path.to_owned(),
                 source,
             })?;
-        let settings = options.settings(&header, rig.analysis.clone())?;
+        let settings = AnalysisSettings {
+            selected_out: options.selected_out.to_vec(),
+            ..options.settings(&header, rig.analysis.clone())?
+        };
         Ok(Self {
             path: path.to_owned(),
             reader,

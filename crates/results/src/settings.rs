@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use skinrig_model::{AnalysisSettings, RunHeader};
+use skinrig_model::{AnalysisSettings, RunHeader, SelectedOut};
 use skinrig_protocol::{Protocol, REFERENCE_CODE, Schedule};
 
 use crate::error::ResultsError;
@@ -16,6 +16,8 @@ pub struct AnalysisOptions<'a> {
     pub reference_code: bool,
     /// Take the calibration of this session, and correct it by the calibration presses.
     pub calibration_from: Option<&'a Path>,
+    /// Presses that a selection excludes.
+    pub selected_out: &'a [SelectedOut],
 }
 
 impl AnalysisOptions<'_> {

@@ -1,4 +1,4 @@
-//! Opens a file of one of the five languages: encoding, size, language, overrides, keys.
+//! Opens a file of one of the languages: encoding, size, language, overrides, keys.
 
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::field::Field;
@@ -75,7 +75,7 @@ pub fn open(
 }
 
 /// Our languages: name of the table, key of the version, and description of such a file in messages.
-const LANGUAGES: [(&str, &str, &str); 5] = [
+const LANGUAGES: [(&str, &str, &str); 7] = [
     ("protocol", "skinrig", "a protocol"),
     (
         "schedule",
@@ -87,6 +87,16 @@ const LANGUAGES: [(&str, &str, &str); 5] = [
         "limits",
         "skinrig_limits",
         "a file of limits, which only `skinrig compare` reads",
+    ),
+    (
+        "selection",
+        "skinrig_selection",
+        "a selection, which stands for a session",
+    ),
+    (
+        "publication",
+        "skinrig_publication",
+        "a publication, which only `skinrig publish --about` reads",
     ),
     (
         "suite",

@@ -12,8 +12,8 @@ use super::values::{
 
 /// Arguments of `analyze`.
 #[derive(Debug, Args)]
-pub struct AnalyzeArgs {
-    /// The session file.
+pub(crate) struct AnalyzeArgs {
+    /// The session file, or a selection.
     pub session: PathBuf,
 
     /// Override one analysis setting of the session's protocol, for example `analysis.min_samples=5`. The result is a variant beside
@@ -53,7 +53,7 @@ pub struct AnalyzeArgs {
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub(crate) struct CompareArgs {
-    /// Two or more skins: session files, folders of sessions, or names of prototypes (all of their sessions in `--sessions`).
+    /// Two or more skins: session files, selections, folders of sessions, or names of prototypes (all of their sessions in `--sessions`).
     #[arg(required = true, num_args = 2.., value_name = "SKIN")]
     pub skins: Vec<String>,
 
@@ -110,7 +110,7 @@ pub enum CostKind {
 /// Arguments of `tradeoff`.
 #[derive(Debug, Args)]
 pub(crate) struct TradeoffArgs {
-    /// The session file.
+    /// The session file, or a selection.
     pub session: PathBuf,
 
     /// Override one analysis setting of the session's protocol first.
@@ -171,8 +171,8 @@ pub(crate) struct OnlineArgs {
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
-pub struct ReportArgs {
-    /// The session file.
+pub(crate) struct ReportArgs {
+    /// The session file, or a selection.
     pub session: PathBuf,
 
     /// Report this named variant (`skinrig analyze --name`) [default: the official analysis].

@@ -158,7 +158,7 @@ pub(crate) enum ExportTable {
 /// Arguments of `export`.
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
-    /// The session file.
+    /// The session file, or a selection.
     pub session: PathBuf,
 
     /// Output format. Can be given several times.
@@ -173,9 +173,89 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 
+    /// Sign the manifest of a bundle with this private key of `ssh-keygen`.
+    #[arg(long, value_name = "KEY")]
+    pub sign: Option<PathBuf>,
+
     /// Overwrite the files of an earlier export.
     #[arg(long)]
     pub overwrite: bool,
+}
+
+/// Presses that do not count, and why.
+#[derive(Debug, Clone)]
+pub(crate) struct Exclude {
+    /// Numbers and spans, separated by commas.
+    pub presses: String,
+    pub reason: String,
+}
+
+/// Arguments of `select`.
+#[derive(Debug, Args)]
+pub(crate) struct SelectArgs {
+    /// Sealed session files.
+    #[arg(required = true, value_name = "SESSION")]
+    pub sessions: Vec<PathBuf>,
+
+    /// Name of the selection; results from it show the name.
+    #[arg(long)]
+    pub name: String,
+
+    /// Presses that do not count, and why, for example `"7,12-14=the lamp failed"`. Can be given several times.
+    #[arg(long, value_name = "PRESSES=REASON", value_parser = super::values::exclude, requires = "decided_by")]
+    pub exclude: Vec<Exclude>,
+
+    /// Who decided on the exclusions.
+    #[arg(long, value_name = "PERSON")]
+    pub decided_by: Option<String>,
+
+    /// The file to write.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
+/// Arguments of `lake`.
+#[derive(Debug, Args)]
+pub(crate) struct LakeArgs {
+    /// Sealed session files, or folders of sessions.
+    #[arg(required = true, value_name = "SESSION")]
+    pub sessions: Vec<PathBuf>,
+
+    /// Folder of the lake; created if missing.
+    #[arg(long, value_name = "DIR")]
+    pub to: PathBuf,
+}
+
+/// Arguments of `publish`.
+#[derive(Debug, Args)]
+pub(crate) struct PublishArgs {
+    /// Sealed session files, or one selection.
+    #[arg(required = true, value_name = "SESSION")]
+    pub sessions: Vec<PathBuf>,
+
+    /// File with what skinrig cannot know: title, description, people, licence, known limits.
+    #[arg(long, value_name = "FILE")]
+    pub about: PathBuf,
+
+    /// A new folder for the crate.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+
+    /// Sign the description with this private key of `ssh-keygen`.
+    #[arg(long, value_name = "KEY")]
+    pub sign: Option<PathBuf>,
+}
+
+/// Arguments of `reproduce`.
+#[derive(Debug, Args)]
+pub(crate) struct ReproduceArgs {
+    /// The folder of the crate.
+    #[arg(value_name = "CRATE")]
+    pub folder: PathBuf,
+
+    /// Require a signature by a key in this file of allowed signers, with lines such as `NAME ssh-ed25519 KEY`.
+    #[arg(long, value_name = "FILE")]
+    pub signers: Option<PathBuf>,
 }
 
 /// Arguments of `inspect`.
@@ -200,6 +280,10 @@ pub(crate) enum SchemaKind {
     Rig,
     /// Limits (`compare`).
     Limits,
+    /// Selections (`select`).
+    Selection,
+    /// What a publication states (`publish --about`).
+    Publication,
     /// Suites (`hil run`).
     Suite,
 }

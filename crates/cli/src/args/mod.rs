@@ -24,9 +24,9 @@ pub(crate) use self::evaluate::{
     AnalyzeArgs, CompareArgs, CostKind, OnlineArgs, ReportArgs, TradeoffArgs,
 };
 pub(crate) use self::files::{
-    CompletionsArgs, ExportArgs, ExportKind, ExportTable, ImportArgs, InitArgs, InspectArgs,
-    ManArgs, NewArgs, PrototypesArgs, SalvageArgs, SchemaArgs, SchemaKind, SessionsArgs, ShowArgs,
-    TagArgs,
+    CompletionsArgs, Exclude, ExportArgs, ExportKind, ExportTable, ImportArgs, InitArgs,
+    InspectArgs, LakeArgs, ManArgs, NewArgs, PrototypesArgs, PublishArgs, ReproduceArgs,
+    SalvageArgs, SchemaArgs, SchemaKind, SelectArgs, SessionsArgs, ShowArgs, TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
 pub(crate) use self::values::StopRule;
@@ -215,9 +215,9 @@ pub(crate) enum Command {
 
     /// Verify every checksum, count and hash of a session or of a bundle made by `export`.
     #[command(
-        after_help = "Examples:\n  skinrig verify sessions/NAME.session.sqlite\n  skinrig verify NAME.bundle"
+        after_help = "Examples:\n  skinrig verify sessions/NAME.session.sqlite\n  skinrig verify NAME.bundle --signers signers"
     )]
-    Verify(SessionArg),
+    Verify(VerifyArgs),
 
     /// Copy the intact part of a damaged session into a new file, and list what was lost.
     #[command(
@@ -225,6 +225,15 @@ pub(crate) enum Command {
         The damaged file is only read. Exit code 4 if something is known to be lost."
     )]
     Salvage(SalvageArgs),
+
+    /// Write a selection: sessions by the hash of their content, and presses that do not count, with reasons.
+    #[command(
+        after_help = "Example:\n  skinrig select sessions/NAME.session.sqlite --name \"mold 3, lamp on\" \\\n    \
+        --exclude \"7,12-14=the lamp failed\" --decided-by \"A. Person\" --out lamp-on.selection.yaml\n\n\
+        `analyze`, `report`, `compare`, `tradeoff`, `export` and `verify` take a selection for a session. Results from it are variants,\n\
+        name its hash, and state the RMSE without it."
+    )]
+    Select(SelectArgs),
 
     /// Import the published dataset's files as a session.
     #[command(
@@ -240,6 +249,25 @@ pub(crate) enum Command {
         skinrig export sessions/NAME.session.sqlite --to bundle --out NAME.bundle"
     )]
     Export(ExportArgs),
+
+    /// Add sessions to a data lake: presses, estimates, features, metrics and poses as one Parquet dataset.
+    #[command(after_help = "Example:\n  skinrig lake sessions/ --to lake/\n\n\
+        Partitions: analysis version, prototype, bench, day. Sessions that are there are not added again. In DuckDB:\n  \
+        SELECT prototype, avg(error_mm) FROM read_parquet('lake/estimates/**/*.parquet', hive_partitioning = true) GROUP BY prototype")]
+    Lake(LakeArgs),
+
+    /// Publish sessions or a selection as an RO-Crate: data card, checksums, bundles, protocols, and numbers to derive again.
+    #[command(
+        after_help = "Example:\n  skinrig publish sessions/NAME.session.sqlite --about publication.yaml --out crate/\n\n\
+        `skinrig schema publication` has the keys of the file for --about: title, description, people, licence, known limits."
+    )]
+    Publish(PublishArgs),
+
+    /// Check a published crate: every checksum, and every headline number derived again, bit by bit.
+    #[command(
+        after_help = "Example:\n  skinrig reproduce crate/\n\nExit code 4 if anything differs."
+    )]
+    Reproduce(ReproduceArgs),
 
     /// Give a session's events away with the scored positions sealed, and score estimates from anywhere.
     #[command(
@@ -296,9 +324,13 @@ pub struct ProtocolArgs {
     pub overrides: Vec<String>,
 }
 
-/// A session file or a bundle.
+/// Arguments of `verify`.
 #[derive(Debug, Args)]
-pub(crate) struct SessionArg {
-    /// The session file, or the folder of a bundle.
+pub(crate) struct VerifyArgs {
+    /// The session file, a selection, or the folder of a bundle.
     pub session: PathBuf,
+
+    /// Require a signature of the bundle by a key in this file of allowed signers, with lines such as `NAME ssh-ed25519 KEY`.
+    #[arg(long, value_name = "FILE")]
+    pub signers: Option<PathBuf>,
 }

@@ -1,5 +1,6 @@
 //! Parsers of command line values with units and ranges.
 
+use super::files::Exclude;
 use skinrig_settings::Dimension;
 use skinrig_settings::quantity::{self, QuantityError};
 
@@ -27,6 +28,9 @@ pub(super) enum ValueError {
     /// Not a number, or not above 0.
     #[error("expected a number per second above 0, found {found}")]
     PerSecond { found: String },
+    /// No presses, or no reason.
+    #[error("expected PRESSES=REASON, for example `7,12-14=the lamp failed`, found `{found}`")]
+    Exclude { found: String },
     /// Neither a factor above 0 nor `max`.
     #[error("expected a factor above 0 or `max`, found {found}")]
     Speed { found: String },
@@ -106,6 +110,24 @@ pub(super) fn stop_rule(text: &str) -> Result<StopRule, ValueError> {
         let quantity = quantity::parse(text, &[Dimension::Length, Dimension::Time]);
         quantity.map_err(ValueError::Quantity)?;
         time_s(text).map(|s| StopRule::After(s * 1e3))
+    })
+}
+
+/// Presses and a reason.
+pub(super) fn exclude(text: &str) -> Result<Exclude, ValueError> {
+    let is_number = |c: char| c.is_ascii_digit() || ", -".contains(c);
+    let parts = text
+        .split_once('=')
+        .map(|(presses, reason)| (presses.trim(), reason.trim()));
+    let good = parts.filter(|(presses, reason)| {
+        !presses.is_empty() && presses.chars().all(is_number) && !reason.is_empty()
+    });
+    let (presses, reason) = good.ok_or_else(|| ValueError::Exclude {
+        found: text.to_owned(),
+    })?;
+    Ok(Exclude {
+        presses: presses.to_owned(),
+        reason: reason.to_owned(),
     })
 }
 

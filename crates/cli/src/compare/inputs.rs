@@ -7,11 +7,14 @@ use skinrig_compare::{Session, Subject};
 use skinrig_recorder::{SessionReader, list};
 
 use super::facts::facts;
+use super::selections::{self, SelectedResult, without_results};
 use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
+use crate::analyze::without_selection;
 use crate::args::CompareArgs;
 use crate::exit::Failure;
 use crate::results::analyze_shown;
+use crate::selection::{self, Target};
 use crate::sessions::{copies, originals};
 
 /// Most skins in one comparison: letters A to H.
@@ -21,10 +24,22 @@ const MAX_SKINS: usize = 8;
 pub(super) struct SkinSessions {
     pub subject: Subject,
     pub paths: Vec<PathBuf>,
+    /// What a selection changes in each session; empty without one.
+    pub selected: Vec<SelectedResult>,
 }
 
 /// Resolves each skin argument.
 pub(super) fn subjects(args: &CompareArgs) -> Result<Vec<SkinSessions>, Failure> {
+    if let (Some(name), Some(skin)) = (
+        &args.analysis,
+        args.skins
+            .iter()
+            .find(|s| selection::is_named(Path::new(s))),
+    ) {
+        return Err(Failure::input(format!(
+            "--analysis {name}: expected no selection, found {skin}\n  next: leave --analysis out"
+        )));
+    }
     if args.skins.len() > MAX_SKINS {
         return Err(Failure::input(format!(
             "expected at most {MAX_SKINS} skins, found {}\n  next: compare them in groups with a common first one",
@@ -45,10 +60,10 @@ fn skin_sessions(
     analysis: Option<&str>,
 ) -> Result<SkinSessions, Failure> {
     let path = Path::new(text);
-    let (name, paths) = if path.is_dir() {
+    let (name, targets) = if path.is_dir() {
         (None, session_paths(path, None)?)
     } else if path.is_file() {
-        (None, vec![path.to_owned()])
+        (None, selection::sessions(path)?.sessions)
     } else if text.contains(std::path::MAIN_SEPARATOR)
         || text.ends_with(crate::paths::SESSION_SUFFIX)
     {
@@ -59,7 +74,7 @@ fn skin_sessions(
     } else {
         (Some(text), session_paths(folder, Some(text))?)
     };
-    if paths.is_empty() {
+    if targets.is_empty() {
         let (what, expected) = match name {
             Some(name) => (folder.display(), format!("sessions of prototype `{name}`")),
             None => (path.display(), "sessions".to_owned()),
@@ -69,13 +84,21 @@ fn skin_sessions(
              names another folder"
         )));
     }
-    let sessions: Result<Vec<Session>, Failure> =
-        paths.iter().map(|p| session(p, analysis)).collect();
-    let sessions = sessions?;
+    let mut selected = Vec::new();
+    let mut sessions = Vec::new();
+    for target in &targets {
+        let (session, of_selection) = session(target, analysis)?;
+        sessions.push(session);
+        selected.extend(of_selection);
+    }
+    let paths: Vec<PathBuf> = targets.iter().map(|t| t.path.clone()).collect();
     let own = sessions.first().map(|s| s.facts.prototype.clone());
     let mut name = name.map(str::to_owned).or(own).unwrap_or_default();
     if let Some(analysis) = analysis {
         name = format!("{name} ({})", changes(&paths, analysis)?);
+    }
+    if let Some(first) = selected.first() {
+        name = format!("{name}, selection {}", first.name);
     }
     Ok(SkinSessions {
         subject: Subject {
@@ -84,11 +107,12 @@ fn skin_sessions(
             sessions,
         },
         paths,
+        selected,
     })
 }
 
 /// The sessions of a folder, of one prototype or all. A broken file is an error; it is not skipped.
-fn session_paths(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
+fn session_paths(folder: &Path, prototype: Option<&str>) -> Result<Vec<Target>, Failure> {
     let all = list(folder).map_err(Failure::session)?;
     let mut selected = all;
     selected.retain(|s| prototype.is_none() || s.prototype() == prototype);
@@ -97,7 +121,10 @@ fn session_paths(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>,
     }
     Ok(originals(&selected)
         .into_iter()
-        .map(|s| s.path.clone())
+        .map(|s| Target {
+            path: s.path.clone(),
+            selected: None,
+        })
         .collect())
 }
 
@@ -112,7 +139,12 @@ fn changes(paths: &[PathBuf], name: &str) -> Result<String, Failure> {
     Ok(all.into_iter().collect::<Vec<_>>().join("; "))
 }
 
-fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
+/// Reads the results of a session, or analyses it; also returns what its selection changes.
+fn session(
+    target: &Target,
+    name: Option<&str>,
+) -> Result<(Session, Option<SelectedResult>), Failure> {
+    let Target { path, selected } = target;
     let unreadable = Failure::session;
     let reader = SessionReader::open(path).map_err(unreadable)?;
     let header = reader.header().map_err(unreadable)?;
@@ -120,25 +152,24 @@ fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
     let variant = name
         .map(|name| analyses::variant(path, &facts.session_id, name))
         .transpose()?;
+    let choices = match &variant {
+        Some(variant) => {
+            without_selection(variant)?;
+            AnalysisRequest::of_variant(variant)
+        }
+        None => AnalysisRequest::default(),
+    };
+    if let Some(selected) = selected {
+        let (analysis, result) = selections::analysis(path, &facts.session_id, selected)?;
+        return Ok((Session { facts, analysis }, Some(result)));
+    }
     let analysis = match analyses::stored(path, &facts.session_id, name) {
         Some(analysis) => analysis,
         None => {
-            let choices =
-                variant
-                    .as_ref()
-                    .map_or_else(AnalysisRequest::default, |v| AnalysisRequest {
-                        overrides: &v.changed,
-                        reference_code: v.reference_code,
-                        name: Some(&v.name),
-                        calibration_from: v.calibration_from.as_deref(),
-                    });
             analyze_shown(path, choices)
-                .map_err(|f| Failure {
-                    message: format!("{}\n  ({}: no results)", f.message, path.display()),
-                    ..f
-                })?
+                .map_err(|f| without_results(path, f))?
                 .analysis
         }
     };
-    Ok(Session { facts, analysis })
+    Ok((Session { facts, analysis }, None))
 }

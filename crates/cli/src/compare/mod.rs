@@ -3,6 +3,7 @@
 mod facts;
 mod inputs;
 mod margins;
+mod selections;
 
 use std::path::{Path, PathBuf};
 
@@ -33,6 +34,7 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
     let (found, result) = compared(args)?;
     let blocked = refusal(&result, args);
     let mut document = report::json(&result);
+    add_selections(&mut document, &found);
     if blocked.is_none() {
         let page = args.out.clone().unwrap_or_else(|| beside(&found));
         let results = write_page(&result, &document, &page)?;
@@ -40,6 +42,10 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
             document["files"] = serde_json::json!({ "page": page, "results": results });
             crate::terminal::print_json(&document);
         } else {
+            for skin in &found {
+                let lines = skin.selected.iter().map(|s| s.line(skin.subject.letter));
+                lines.for_each(|line| outln!("{line}"));
+            }
             let table =
                 report::terminal_table(&result, crate::terminal::is_coloured(&std::io::stdout()));
             crate::terminal::out(format_args!("{table}"));
@@ -56,6 +62,18 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
         crate::terminal::out(format_args!("{table}"));
     }
     Err(Failure::input(blocked.unwrap_or_default()))
+}
+
+/// Adds the RMSE with and without a selection.
+fn add_selections(document: &mut serde_json::Value, found: &[inputs::SkinSessions]) {
+    let all = found.iter().flat_map(|skin| {
+        let letter = skin.subject.letter;
+        skin.selected.iter().map(move |s| s.document(letter))
+    });
+    let all: Vec<_> = all.collect();
+    if !all.is_empty() {
+        document["selections"] = all.into();
+    }
 }
 
 /// Settings in which two sessions with their stored analyses differ, and the number of settings.
@@ -87,11 +105,12 @@ pub(crate) fn fact_differences(
 /// # Errors
 /// As [`compare`].
 pub(crate) fn document(args: &CompareArgs) -> Result<serde_json::Value, Failure> {
-    let (_, result) = compared(args)?;
+    let (found, result) = compared(args)?;
     if let Some(blocked) = refusal(&result, args) {
         return Err(Failure::input(blocked));
     }
-    let document = report::json(&result);
+    let mut document = report::json(&result);
+    add_selections(&mut document, &found);
     if let Some(page) = &args.out {
         write_page(&result, &document, page)?;
     }
@@ -207,6 +226,7 @@ fn settings_of(subject: &Subject) -> Option<AnalysisSettings> {
 fn same_numbers(a: &AnalysisSettings, b: &AnalysisSettings) -> bool {
     let plain = |s: &AnalysisSettings| AnalysisSettings {
         exclude_press_numbers: Vec::new(),
+        selected_out: Vec::new(),
         ..only_locating(s.clone())
     };
     plain(a) == plain(b)
@@ -240,8 +260,10 @@ fn reanalyse(
         let (aligned, _) = open(path, AnalysisRequest::default())?;
         let (mut input, events) = (aligned.input, aligned.events);
         let own = input.settings.exclude_press_numbers.clone();
+        let selected_out = session.analysis.settings.selected_out.clone();
         input.settings = AnalysisSettings {
             exclude_press_numbers: own,
+            selected_out,
             seed: settings.seed,
             ..only_locating(settings.clone())
         };

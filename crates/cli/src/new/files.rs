@@ -92,6 +92,10 @@ pub(super) const LAB: &[StarterFile] = &[
         "protocols/skinrig-limits.schema.json",
         skinrig_protocol::limits_schema_json,
     ),
+    StarterFile::generated(
+        "protocols/skinrig-selection.schema.json",
+        skinrig_protocol::selection_schema_json,
+    ),
     same!("hil/nightly.yaml"),
     same!("hil/first-contact.yaml"),
     same!("hil/golden.yaml"),

@@ -27,6 +27,7 @@ mod import_refusals;
 mod installed;
 mod interrupt;
 mod json;
+mod lake;
 #[cfg(target_os = "linux")]
 mod nightly;
 mod notify;
@@ -36,14 +37,17 @@ mod operator;
 mod options;
 mod pictures;
 mod pipeline;
+mod publish;
 mod python;
 mod remounted;
 mod replay;
 mod resume;
 mod rigs;
 mod sample_size;
+mod selection;
 #[path = "../../../notify/tests/it/servers.rs"]
 mod servers;
+mod signing;
 mod special;
 mod starter;
 mod stopping;

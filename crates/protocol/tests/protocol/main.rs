@@ -13,6 +13,7 @@ mod remaining;
 mod rig;
 mod scene;
 mod schedules;
+mod selection;
 mod shipped;
 mod stop;
 mod suite;

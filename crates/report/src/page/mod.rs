@@ -24,7 +24,7 @@ use self::cells::missing;
 use crate::document::{Banner, Block, Document, Group, Note, Section, Table, Text};
 use crate::format::or_missing;
 use crate::input::ReportInput;
-use crate::{derive, figures, tables};
+use crate::{derive, figures, selection, tables};
 
 /// One script: each part is wrapped in its own function.
 const SCRIPT: &str = concat!(
@@ -126,7 +126,15 @@ fn banners(input: &ReportInput<'_>) -> Vec<Banner> {
         let words = format!("Do not use the numbers and figures of this session: {why}.");
         Banner::invalid("invalid", "INVALID", words)
     });
-    [variant, stand_in, invalid].into_iter().flatten().collect()
+    let selected = selection::headline(input);
+    let selected = selected.map(|text| {
+        let without = selection::without(input).map_or_else(String::new, |w| format!(". RMSE {w}"));
+        Banner::note("selection", "Selection", format!("{text}{without}."))
+    });
+    [selected, variant, stand_in, invalid]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// The card of a table of results; `None` for an invalid session.

@@ -16,7 +16,7 @@ use crate::format::plain;
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 use crate::input::ReportInput;
 use crate::page::findings::{fault, law};
-use crate::{course, derive};
+use crate::{course, derive, selection};
 
 /// A formatted metric.
 pub(crate) struct MetricRow {
@@ -113,7 +113,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     let sections = [
         head(input),
         problems(a),
-        scored(a),
+        scored(input),
         presses(a).with_all(clocks(a)).with_all(events(input)),
         studies,
     ];
@@ -139,7 +139,9 @@ fn head(input: &ReportInput<'_>) -> Section {
         Some(why) => format!("{}: {why}", or_missing(&p.run_end)),
         None => or_missing(&p.run_end).to_owned(),
     };
+    let selected = selection::headline(input);
     Section::plain()
+        .with_all(selected.map(|text| Note::new("SELECTION", text).warning()))
         .with(Note::new("session", or_missing(&p.session_id)))
         .with_all(variant)
         .with_all(changes)
@@ -174,7 +176,8 @@ fn problems(a: &Analysis) -> Section {
 }
 
 /// The metrics, and the RMSE counted in other ways.
-fn scored(a: &Analysis) -> Section {
+fn scored(input: &ReportInput<'_>) -> Section {
+    let a = input.analysis;
     let columns = [
         Column::of_terminals("scored presses", Cells::left(24)),
         Column::of_terminals("value", Cells::right(7)),
@@ -219,6 +222,9 @@ fn scored(a: &Analysis) -> Section {
         let (value, interval) = (number(e.value, 2), interval(e, 1.0, 2));
         table.add(row(name, value, "mm", interval, e.n, "presses"));
     };
+    if let Some(without) = selection::rmse_without(input) {
+        millimetres("RMSE, no selection".to_owned(), without);
+    }
     if a.scored_without_exclusions != a.scored {
         let all = &a.scored_without_exclusions.rmse_mm;
         millimetres("RMSE, no exclusions".to_owned(), all);

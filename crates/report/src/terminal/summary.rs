@@ -10,7 +10,8 @@ use crate::format::{grouped, interval, number, or_missing};
 use crate::input::ReportInput;
 use crate::page::findings::fault;
 use crate::page::indentation::line;
-use crate::provenance::InterruptionRow;
+use crate::provenance::{InterruptionRow, Variant};
+use crate::selection;
 
 /// Lines of a summary. With three paths and the next step below it, a command ends with a dozen lines.
 const MAX_LINES: usize = 8;
@@ -44,6 +45,8 @@ pub(crate) fn summary(input: &ReportInput<'_>, color: bool) -> String {
 fn head(input: &ReportInput<'_>) -> Vec<Note> {
     let (a, p) = (input.analysis, &input.provenance);
     let mut notes = Vec::new();
+    let selected = selection::headline(input);
+    notes.extend(selected.map(|text| Note::new("SELECTION", text).warning()));
     // Print problems before any number.
     if !a.findings.is_empty() {
         let names: Vec<String> = a.findings.iter().map(fault).collect();
@@ -72,11 +75,13 @@ fn head(input: &ReportInput<'_>) -> Vec<Note> {
         };
         Note::new("RMSE", text).tone(Tone::Answer)
     });
+    notes.extend(selection::without(input).map(|text| Note::new("", text).warning()));
     if a.is_valid() {
         notes.extend(line(a).map(|text| Note::new("depth", text)));
         notes.extend(felt(a).map(|text| Note::new("felt", text)));
     }
-    if let Some(variant) = &p.variant {
+    let is_more = |v: &&Variant| v.selection.is_none() || v.changes().is_some();
+    if let Some(variant) = p.variant.as_ref().filter(is_more) {
         notes.push(Note::new("VARIANT", variant.to_string()).warning());
     }
     if let Some(word) = p.stand_in() {

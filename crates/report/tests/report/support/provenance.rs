@@ -20,6 +20,7 @@ pub(crate) fn provenance() -> Provenance {
         protocol_sha256: "3f5b".repeat(16),
         overrides: vec!["path.repetitions=10".into()],
         variant: None,
+        selection: None,
         plan_sha256: "a90c".repeat(16),
         seed: 20_260_302,
         rig_kind: "simulated".into(),

@@ -1,0 +1,261 @@
+//! Selections stand for sessions: exclusions with reasons, stated before the headline, never silent.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::{Lab, SMALL, files, only, read_json, skinrig, text};
+
+/// A recorded and analysed session.
+fn recorded(lab: &Lab, folder: &str, more: &[&str]) -> String {
+    let sessions = lab.text(folder);
+    skinrig(&[&["run", SMALL, "--sessions", &sessions], more].concat()).code(0);
+    text(&only(&lab.path(folder), ".session.sqlite"))
+}
+
+/// Selects presses of a session; returns the selection's path.
+fn select(lab: &Lab, name: &str, session: &str, exclude: &[&str]) -> String {
+    let out = lab.text(&format!("{name}.selection.yaml"));
+    let mut arguments = vec!["select", session, "--name", name, "--out", &out];
+    for exclude in exclude {
+        arguments.extend(["--exclude", exclude]);
+    }
+    if !exclude.is_empty() {
+        arguments.extend(["--decided-by", "A. Person"]);
+    }
+    skinrig(&arguments).code(0);
+    out
+}
+
+fn edit(path: &str, from: &str, to: &str) {
+    let before = std::fs::read_to_string(path).unwrap();
+    let after = before.replacen(from, to, 1);
+    assert_ne!(before, after, "{from}");
+    std::fs::write(path, after).unwrap();
+}
+
+fn press(document: &Value, number: u32) -> &Value {
+    &document["analysis"]["presses"][number as usize - 1]
+}
+
+#[test]
+fn an_excluded_press_shows_who_excluded_it_and_why_and_what_it_changes() {
+    let lab = Lab::new();
+    let session = recorded(&lab, "s", &[]);
+    let before = files(&lab.path("s"), ".results.json");
+    let official = read_json(&before[0]);
+    let chosen = select(
+        &lab,
+        "lamp",
+        &session,
+        &["4=the lamp \"failed\"", "5-6=hit"],
+    );
+    let shown = skinrig(&["analyze", &chosen]).code(0).out;
+    let lines: Vec<&str> = shown.lines().collect();
+    assert_eq!(
+        lines[0],
+        "selection `lamp`: 1 session(s), 3 press(es) excluded"
+    );
+    let hash = lines[1].trim_start_matches("SHA-256").trim();
+    assert_eq!(
+        hash,
+        crate::support::sha256(&std::fs::read(&chosen).unwrap())
+    );
+    let at = |part: &str| {
+        lines
+            .iter()
+            .position(|l| l.contains(part))
+            .unwrap_or_else(|| panic!("{part} in {shown}"))
+    };
+    assert!(at("SELECTION `lamp` (SHA-256") < at("RMSE  "), "{shown}");
+    assert_eq!(at("mm without the selection"), at("RMSE  ") + 1, "{shown}");
+
+    let label = format!("selection-{}", &hash[..16]);
+    let results = read_json(&only(
+        &lab.path("s"),
+        &format!(".analysis-{label}.results.json"),
+    ));
+    for number in [4, 5, 6] {
+        let reason = if number == 4 {
+            "the lamp \"failed\""
+        } else {
+            "hit"
+        };
+        let press = press(&results, number);
+        assert_eq!(press["verdict"], "excluded");
+        assert_eq!(press["cause"]["by_selection"]["reason"], reason);
+        assert_eq!(
+            press["reason"],
+            format!("excluded by the selection: {reason} (A. Person)")
+        );
+    }
+    let selection = &results["provenance"]["variant"]["selection"];
+    assert_eq!(
+        (&selection["name"], &selection["sha256"]),
+        (&"lamp".into(), &hash.into())
+    );
+    let effect = &results["provenance"]["selection"];
+    assert_eq!(effect["excluded"], 3);
+    assert_eq!(
+        effect["rmse_without_mm"],
+        official["analysis"]["scored"]["rmse_mm"]
+    );
+    assert_eq!(&results["summary"]["selection"], effect);
+    assert_eq!(results["analysis"]["scored"]["rmse_mm"]["n"], 5);
+    let page = only(&lab.path("s"), &format!(".analysis-{label}.report.html"));
+    let page = std::fs::read_to_string(page).unwrap();
+    let first = &page[..page.find("<h2").unwrap()];
+    assert!(first.contains("data-testid=\"selection\"") && first.contains("without the selection"));
+    assert!(page.contains("excluded by the selection"));
+    // Other programs get the same.
+    let found = skinrig::library::analyze(Path::new(&chosen), Default::default(), false);
+    let found = found.map_err(|e| e.message).unwrap();
+    assert_eq!(found["summary"], results["summary"]);
+    // The official results stay, and nothing takes the selection's for them.
+    assert_eq!(read_json(&before[0]), official);
+    let point = skinrig(&["--json", "prototypes", &lab.text("s")])
+        .code(0)
+        .json();
+    let point = &point[0]["series"][0]["points"][0]["rmse_mm"];
+    assert_eq!(point, &official["summary"]["rmse_mm"]);
+    skinrig(&["report", &session, "--analysis", &label])
+        .code(2)
+        .expect_stderr(&["one of `lamp`", "skinrig report"]);
+    skinrig(&["report", &chosen]).code(0);
+
+    let out = lab.text("csv");
+    let csv = [
+        "export", &chosen, "--to", "csv", "--only", "presses", "--out", &out,
+    ];
+    skinrig(&csv).code(0);
+    let csv = only(&lab.path("csv"), &format!(".{label}.presses.csv"));
+    assert!(
+        std::fs::read_to_string(csv)
+            .unwrap()
+            .contains("excluded by the selection: hit (A. Person)")
+    );
+    skinrig(&["export", &chosen, "--to", "bundle"])
+        .code(2)
+        .expect_stderr(&["skinrig publish"]);
+}
+
+#[test]
+fn a_selection_of_several_sessions_is_used_wherever_a_session_is() {
+    let lab = Lab::new();
+    let sessions = [
+        recorded(&lab, "a", &[]),
+        recorded(&lab, "b", &["--seed", "6"]),
+    ];
+    let out = lab.text("both.selection.yaml");
+    let arguments = [
+        "select",
+        &sessions[0],
+        &sessions[1],
+        "--name",
+        "both",
+        "--out",
+        &out,
+    ];
+    let made = skinrig(&arguments).code(0);
+    assert!(made.out.contains("2 session(s), 0 press(es)"), "{made:#?}");
+    let all = skinrig(&["--json", "verify", &out]).code(0).json();
+    assert_eq!(all["selection"]["name"], "both");
+    assert_eq!(all["sessions"].as_array().unwrap().len(), 2);
+    let all = skinrig(&["--json", "analyze", &out]).code(0).json();
+    assert_eq!(all["sessions"][1]["provenance"]["seed"], 6);
+    assert_eq!(all["sessions"][0]["provenance"]["selection"]["excluded"], 0);
+    skinrig(&["tradeoff", &out])
+        .code(2)
+        .expect_stderr(&["a selection of one session, found 2"]);
+    skinrig(&["analyze", &out, "--out", "x.json"]).code(2);
+
+    let chosen = select(&lab, "one", &sessions[0], &["4=hit"]);
+    let page = lab.text("page.html");
+    let compare = ["compare", &chosen, &sessions[1], "--out", &page];
+    let shown = skinrig(&compare).code(0).out;
+    assert!(shown.starts_with("SELECTION A `one` (SHA-256"), "{shown}");
+    let found = skinrig(&[&["--json"], &compare[..]].concat())
+        .code(0)
+        .json();
+    assert_eq!(found["selections"][0]["selection"]["name"], "one");
+    assert_eq!(found["selections"][0]["excluded"], 1);
+    let without = &all["sessions"][0]["analysis"]["scored"]["rmse_mm"];
+    assert_eq!(&found["selections"][0]["rmse_without_mm"], without);
+    let page = std::fs::read_to_string(&page).unwrap();
+    assert!(page.contains("selection `one` (SHA-256"));
+    let shown = skinrig(&["tradeoff", &chosen, "--repeats", "1"]).code(0);
+    assert!(shown.out.contains("the selection `one`"), "{shown:#?}");
+}
+
+#[test]
+fn a_selection_that_does_not_fit_is_rejected_where_it_is_wrong() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let chosen = select(&lab, "x", &session, &["4=hit"]);
+    let good = std::fs::read_to_string(&chosen).unwrap();
+    let rejected = |from: &str, to: &str, parts: &[&str]| {
+        edit(&chosen, from, to);
+        skinrig(&["analyze", &chosen]).code(2).expect_stderr(parts);
+        std::fs::write(&chosen, &good).unwrap();
+    };
+    rejected(
+        "content_sha256: ",
+        "content_sha256: 0",
+        &["x.selection.yaml:5:21", "not a hash"],
+    );
+    let hash = good
+        .split("content_sha256: ")
+        .nth(1)
+        .unwrap()
+        .lines()
+        .next()
+        .unwrap();
+    let other = "0".repeat(64);
+    rejected(
+        hash,
+        &other,
+        &[":5:21", "another content", hash, "skinrig select"],
+    );
+    rejected("[4]", "[4, 99]", &[":7:22", "no such press", "1 to 10"]);
+    rejected("[4]", "[1]", &[":7:19", "sync press"]);
+    rejected(
+        "        reason: \"hit\"\n",
+        "",
+        &[":7:", "a required key is missing", "`reason`"],
+    );
+    rejected(
+        "        decided_by: \"A. Person\"\n",
+        "",
+        &[":7:", "`decided_by`"],
+    );
+
+    // It moves with its session, to one folder.
+    let moved = lab.path("moved");
+    std::fs::create_dir(&moved).unwrap();
+    std::fs::rename(&chosen, moved.join("x.selection.yaml")).unwrap();
+    let moved_to = text(&moved.join("x.selection.yaml"));
+    skinrig(&["verify", &moved_to])
+        .code(2)
+        .expect_stderr(&["the session is missing"]);
+    let name = Path::new(&session).file_name().unwrap();
+    std::fs::rename(&session, moved.join(name)).unwrap();
+    skinrig(&["verify", &moved_to]).code(0);
+
+    let inside = text(&moved.join(name));
+    let out = lab.text("y.yaml");
+    let select = |more: &[&str]| {
+        skinrig(&[&["select", &inside, "--name", "y", "--out", &out], more].concat())
+    };
+    select(&["--exclude", "4=hit"])
+        .code(2)
+        .expect_stderr(&["--decided-by"]);
+    select(&["--exclude", "4", "--decided-by", "p"])
+        .code(2)
+        .expect_stderr(&["PRESSES=REASON"]);
+    select(&["--exclude", "77=hit", "--decided-by", "p"])
+        .code(2)
+        .expect_stderr(&["no such press"]);
+    assert!(!Path::new(&out).exists());
+    select(&[]).code(0);
+    select(&[]).code(2).expect_stderr(&["expected a new file"]);
+}
