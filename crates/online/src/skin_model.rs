@@ -136,3 +136,22 @@ impl SkinModel {
         self.settling.is_some()
     }
 }
+
+#[cfg(test)]
+impl SkinModel {
+    /// A skin with these touches, and a locator of nominal rays.
+    pub(crate) fn nominal(touches: TouchModel, clocks: [ClockFit; 2], threshold: f64) -> Self {
+        Self {
+            settings: AnalysisSettings::default(),
+            outline: SkinOutline::PAPER,
+            geometry: StereoGeometry::PAPER,
+            locator: None,
+            clocks,
+            touches,
+            threshold,
+            settling: None,
+            idle_s: 10.0,
+            clocks_at_us: 0.0,
+        }
+    }
+}

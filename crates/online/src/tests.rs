@@ -8,7 +8,7 @@ use skinrig_statistics::seeded;
 
 use crate::model::{Pattern, TouchModel};
 use crate::regions::{REGIONS, region};
-use crate::{Detection, Detector, Felt};
+use crate::{Detection, Detector, Estimate, Felt, SkinModel, StreamSettings, TouchStream};
 
 const IDLE_PER_S: f64 = 5_000.0;
 const TOUCH_PER_S: f64 = 20_000.0;
@@ -225,5 +225,91 @@ proptest! {
             all.iter().map(|d| (d.felt, d.host_us, d.since_us, d.llr.to_bits())).collect()
         };
         prop_assert_eq!(bits(&found), bits(&expected));
+    }
+}
+
+/// Everything felt in two streams that come whole, one camera after the other, or in slices in turn.
+fn felt(streams: &[Vec<CdEvent>; 2], slice: usize) -> Vec<(Felt, i64)> {
+    let skin = SkinModel::nominal(model(), clocks(), 14.0);
+    let settings = StreamSettings {
+        every_us: 5_000,
+        from_us: 0,
+    };
+    let mut stream = TouchStream::new(&skin, settings).unwrap();
+    let mut found = Vec::new();
+    let mut each = |e: Estimate| {
+        if let Estimate::Felt(d) = e {
+            found.push((d.felt, d.host_us));
+        }
+    };
+    let mut slices = [0, 1].map(|k| streams[k].chunks(slice));
+    loop {
+        let next = [slices[0].next(), slices[1].next()];
+        if next == [None, None] {
+            break;
+        }
+        for (camera, events) in CameraId::ALL.into_iter().zip(next) {
+            let events = events.unwrap_or_default();
+            let newest_us = events.last().map(|e| e.t_us);
+            assert_eq!(stream.push(camera, events, newest_us, &mut each), Ok(()));
+        }
+    }
+    stream.finish(&mut each);
+    found
+}
+
+#[test]
+fn a_gap_in_both_streams_and_a_camera_far_ahead_change_nothing() {
+    // Half a second is missing in both, 0.3 s in one, before the touch from 1 s on.
+    let lost = [300e3..800e3, 300e3..850e3];
+    let mut streams = streams(7, Some(2));
+    for camera in CameraId::ALL {
+        let k = camera.index();
+        let clock = clocks()[k];
+        streams[k].retain(|e| !lost[k].contains(&clock.host_us_of_camera(e.t_us as f64)));
+    }
+    let expected = felt(&streams, 100);
+    let kinds: Vec<Felt> = expected.iter().map(|f| f.0).collect();
+    assert_eq!(kinds, [Felt::Onset, Felt::Release], "{expected:?}");
+    assert!(
+        (1_000_000..1_003_000).contains(&expected[0].1),
+        "{expected:?}"
+    );
+    for slice in [1, 700, usize::MAX] {
+        assert!(felt(&streams, slice) == expected, "{slice}");
+    }
+}
+
+/// A touch taken up at a release, as when one begins to feel in the middle of a press, does not hide those that follow.
+#[test]
+fn a_touch_that_began_at_a_release_ends_before_the_next_press() {
+    let streams = CameraId::ALL.map(|camera| {
+        let k = camera.index();
+        let clock = clocks()[k];
+        let touches = [
+            stream(7, camera, Some(2)),
+            stream(8, camera, Some(2)),
+            stream(9, camera, Some(2)),
+        ];
+        let mut all = Vec::new();
+        for (n, touch) in touches.into_iter().enumerate() {
+            let shift = (clock.camera_us(2e6) - clock.camera_us(0.0)) as u64 * n as u64;
+            all.extend(touch.into_iter().map(|e| CdEvent {
+                t_us: e.t_us + shift,
+                ..e
+            }));
+        }
+        // Nothing of the first press but its release.
+        all.retain(|e| !(0.9e6..1.29e6).contains(&clock.host_us_of_camera(e.t_us as f64)));
+        all.sort_by_key(|e| e.t_us);
+        all
+    });
+    let found = felt(&streams, 500);
+    for contact_us in [3_000_000, 5_000_000] {
+        let onset = (Felt::Onset, contact_us..contact_us + 5_000);
+        let is_felt = found
+            .iter()
+            .any(|(felt, at)| *felt == onset.0 && onset.1.contains(at));
+        assert!(is_felt, "{contact_us}: {found:?}");
     }
 }

@@ -14,7 +14,7 @@ pub(crate) struct UnderWay {
 
 enum State {
     /// Nothing is learnt: only the time of the streams is followed.
-    Ignorant(Decoders),
+    Ignorant(Box<Decoders>),
     Feeling(Box<(Live, SkinModel)>),
     /// A step failed.
     Gone,
@@ -24,7 +24,7 @@ impl UnderWay {
     /// For cameras that send these formats; positions of a touch come every so many µs of host time.
     pub(crate) fn new(formats: [StreamFormat; 2], every_us: i64) -> Self {
         Self {
-            state: State::Ignorant(Decoders::new(formats)),
+            state: State::Ignorant(Box::new(Decoders::new(formats))),
             every_us,
         }
     }
@@ -36,7 +36,7 @@ impl UnderWay {
     pub(crate) fn start(&mut self, skin: SkinModel) -> Result<(), StreamError> {
         let decoders = match std::mem::replace(&mut self.state, State::Gone) {
             State::Ignorant(decoders) => decoders,
-            State::Feeling(both) => both.0.into_decoders(),
+            State::Feeling(both) => Box::new(both.0.into_decoders()),
             State::Gone => return Ok(()),
         };
         let host_us = |camera: CameraId| {
@@ -47,7 +47,7 @@ impl UnderWay {
             every_us: self.every_us,
             from_us: host_us(CameraId::One).max(host_us(CameraId::Two)),
         };
-        let live = Live::new(decoders, &skin, settings)?;
+        let live = Live::new(*decoders, &skin, settings)?;
         self.state = State::Feeling(Box::new((live, skin)));
         Ok(())
     }

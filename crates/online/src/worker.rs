@@ -207,3 +207,52 @@ fn work(mut core: Core, jobs: &Receiver<Job>, say: &Sender<News>, queued: &Atomi
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What does not fit is skipped until everything queued was taken, counted, and said before what follows.
+    #[test]
+    fn a_full_queue_skips_and_says_so() {
+        let (jobs, todo) = channel();
+        let (_, news) = channel();
+        let queued = Arc::new(AtomicUsize::new(0));
+        let mut thread = Thread {
+            jobs,
+            news,
+            queued: Arc::clone(&queued),
+            skipped: None,
+        };
+        let block = vec![0; MOST_QUEUED / 4];
+        for _ in 0..6 {
+            thread.feed(CameraId::One, 0, &block);
+        }
+        thread.feed(CameraId::Two, 7, &[1, 2, 3, 4]);
+        let taken = |todo: &Receiver<Job>| todo.try_iter().collect::<Vec<_>>();
+        let first = taken(&todo);
+        assert_eq!(first.len(), 4);
+        queued.fetch_sub(MOST_QUEUED / 2, Ordering::AcqRel);
+        thread.feed(CameraId::Two, 0, &[5, 6]);
+        assert!(taken(&todo).is_empty());
+        queued.store(0, Ordering::Release);
+        thread.feed(CameraId::One, 0, &[7, 8]);
+        let rest = taken(&todo);
+        let [
+            Job::Skip(skipped),
+            Job::Bytes {
+                camera,
+                lost,
+                bytes,
+            },
+        ] = &rest[..]
+        else {
+            panic!("{} jobs", rest.len());
+        };
+        assert_eq!(*skipped, [2 * block.len() as u64, 7 + 4 + 2]);
+        assert_eq!(
+            (*camera, *lost, &bytes[..]),
+            (CameraId::One, 0, &[7, 8][..])
+        );
+    }
+}

@@ -1,26 +1,30 @@
 //! `skinrig online`: what a replay prints, and sessions that it cannot learn from.
 
 use serde_json::Value;
+use skinrig_model::TouchKind;
+use skinrig_recorder::SessionReader;
 
-use crate::support::{Lab, skinrig, text};
+use crate::support::{Lab, only, skinrig, text};
 
 /// Three repetitions calibrate, one scores.
 fn session(lab: &Lab) -> String {
-    text(&lab.record(
-        "s",
-        &[
-            "--set",
-            "repetitions.count=4",
-            "--set",
-            "evaluation.calibrate=[1, 2, 3]",
-            "--set",
-            "evaluation.score=[4]",
-            "--set",
-            "analysis.calibration=positions",
-            "--set",
-            "analysis.bootstrap_resamples=50",
-        ],
-    ))
+    session_with(lab, &[])
+}
+
+fn session_with(lab: &Lab, more: &[&str]) -> String {
+    let usual = [
+        "--set",
+        "repetitions.count=4",
+        "--set",
+        "evaluation.calibrate=[1, 2, 3]",
+        "--set",
+        "evaluation.score=[4]",
+        "--set",
+        "analysis.calibration=positions",
+        "--set",
+        "analysis.bootstrap_resamples=50",
+    ];
+    text(&lab.record("s", &[&usual, more].concat()))
 }
 
 #[test]
@@ -57,6 +61,55 @@ fn a_replay_gives_a_line_per_estimate_or_twelve_at_most() {
         felt("onset") >= felt("release") && felt("release") >= 15,
         "{short}"
     );
+}
+
+/// A simulated session whose scored presses stop when they are felt: the figures in its results, and the same commands again in
+/// a replay.
+#[test]
+fn presses_stop_when_they_are_felt_while_recording() {
+    let lab = Lab::new();
+    let session = session_with(&lab, &["--set", "online.react.then=stop"]);
+    let reader = SessionReader::open(&session).unwrap();
+    let touches = reader.touches().unwrap();
+    assert_eq!(touches[0].kind, TouchKind::Started);
+    let stopped: Vec<_> = touches
+        .iter()
+        .filter(|t| t.kind == TouchKind::Stopped)
+        .collect();
+    assert!(!stopped.is_empty());
+    let presses = reader.presses().unwrap();
+    for touch in &stopped {
+        let press = touch.attempt.unwrap().press;
+        let (planned, attempts) = presses.iter().find(|(p, _)| p.id == press).unwrap();
+        let outcome = attempts[0].outcome.as_ref().unwrap();
+        assert!(outcome.measured_depth_mm.unwrap() < planned.depth_mm - 0.1);
+    }
+    let results = skinrig(&["--json", "analyze", &session]).code(0).out;
+    let results: Value = serde_json::from_str(&results).unwrap();
+    let felt = &results["felt"];
+    assert_eq!(felt["presses"], 4, "{felt}");
+    assert_eq!(felt["reactions"]["reaction"], "stop");
+    assert_eq!(felt["reactions"]["reaction_ms"]["n"], stopped.len());
+    let warnings = results["warnings"].to_string();
+    assert!(warnings.contains("stopped_when_felt"), "{warnings}");
+
+    let folder = lab.path("again");
+    skinrig(&[
+        "run",
+        "--replay",
+        &session,
+        "--sessions",
+        &text(&folder),
+        "--no-analysis",
+    ])
+    .code(0);
+    let again = SessionReader::open(only(&folder, ".session.sqlite")).unwrap();
+    let commands = |reader: &SessionReader| -> Vec<_> {
+        let rows = reader.commands().unwrap();
+        rows.into_iter().map(|row| (row.t, row.command)).collect()
+    };
+    assert!(commands(&again) == commands(&reader));
+    assert!(again.touches().unwrap() == touches);
 }
 
 #[test]

@@ -226,6 +226,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         }],
         pictures,
         zooms,
+        felt: None,
         motion: Some(studies::motion()),
     }
 }
