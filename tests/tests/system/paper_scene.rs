@@ -268,10 +268,10 @@ fn figures(scene: &Scene) -> Vec<Figure> {
         ),
         figure(
             "RMSE at 1/1024, mm",
-            Predicted,
+            Fitted,
             last.rmse_mm.value,
             published::RMSE_1024_MM,
-            0.25,
+            0.1,
         ),
         figure(
             "pass rate at 1/1024",
@@ -377,7 +377,7 @@ fn paper_scene_beside_the_published_figures() {
             if is_within { "yes" } else { "NO" },
         );
     }
-    // docs/explanation/optical-model.md lists these.
+    // protocols/paper.md lists these.
     assert_eq!(outside, OUTSIDE);
 }
 

@@ -22,7 +22,7 @@ pub(crate) struct SceneKeys {
     tolerances: Option<ToleranceKeys>,
     /// The simulation level outright; must be sufficient for `needs` and `tolerances`.
     level: Option<SimLevel>,
-    /// Physics added to the optical level, fitted to the published figures (docs/explanation/optical-model.md). All of it is the
+    /// Physics added to the optical level, fitted to the published figures (protocols/paper.md). All of it is the
     /// scene `paper`.
     #[setting(items = 1..=9, example = "[press_scatter, uneven_noise]")]
     parts: Option<Vec<ScenePart>>,

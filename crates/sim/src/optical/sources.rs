@@ -73,8 +73,16 @@ pub const PARAMETERS: [Parameter; 26] = {
             "refractory_mean_us",
             Assumed("as in the base model"),
         ),
-        of(UnevenNoise, "leak_hz", Fitted("RMSE")),
-        of(UnevenNoise, "shot_hz", Fitted("RMSE")),
+        of(
+            UnevenNoise,
+            "leak_hz",
+            Fitted("RMSE, also at 1/1024 (not reached)"),
+        ),
+        of(
+            UnevenNoise,
+            "shot_hz",
+            Fitted("RMSE, also at 1/1024 (not reached)"),
+        ),
         of(UnevenNoise, "dark_hz", Fitted("event rate between presses")),
         of(UnevenNoise, "hot_pixels", Assumed("")),
         of(UnevenNoise, "hot_hz", Fitted("RMSE")),
