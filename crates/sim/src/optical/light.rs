@@ -10,7 +10,6 @@ use crate::random::{Purpose, Stream};
 
 use super::config::OpticalConfig;
 use super::parts::UnevenLight;
-use super::pod::Pod;
 
 /// Spacing of the points at which a ray is followed, mm, or a little less.
 const RAY_STEP_MM: f64 = 4.0;
@@ -193,14 +192,11 @@ impl Column {
         outline: &SkinOutline,
         light: &Illumination,
         config: &OpticalConfig,
-        pod: Option<&Pod>,
+        enter: impl Fn(Vec2, Vec2) -> (Vec2, Vec2),
     ) -> Self {
         let direction = camera.direction(camera.angle_of_column_deg(f64::from(x)));
         let origin = [camera.position.x_mm, camera.position.y_mm];
-        let (origin, direction) = match pod {
-            Some(pod) => pod.refract(origin, direction),
-            None => (origin, direction),
-        };
+        let (origin, direction) = enter(origin, direction);
         let at = |s: f64| [origin[0] + s * direction[0], origin[1] + s * direction[1]];
         let (enter_mm, exit_mm) = inside(
             outline,
@@ -247,16 +243,16 @@ impl Column {
     }
 }
 
-/// All columns of the camera.
+/// All columns of the camera. `enter` gives the origin and direction in the skin of a ray that leaves the lens.
 pub(super) fn columns(
     camera: &CameraModel,
     outline: &SkinOutline,
     light: &Illumination,
     config: &OpticalConfig,
-    pod: Option<&Pod>,
+    enter: impl Fn(Vec2, Vec2) -> (Vec2, Vec2),
 ) -> Vec<Column> {
     (0..SENSOR_WIDTH)
-        .map(|x| Column::new(camera, x, outline, light, config, pod))
+        .map(|x| Column::new(camera, x, outline, light, config, &enter))
         .collect()
 }
 
@@ -391,7 +387,7 @@ mod tests {
         let config = OpticalConfig::default();
         let light = Illumination::new(&skin, &config, 0);
         for camera in StereoGeometry::PAPER.cameras {
-            for column in columns(&camera, &skin, &light, &config, None)
+            for column in columns(&camera, &skin, &light, &config, |lens, d| (lens, d))
                 .iter()
                 .step_by(37)
             {
@@ -423,7 +419,9 @@ mod tests {
         let mut camera = StereoGeometry::PAPER.cameras[0];
         camera.position = Point2::new(300.0, 0.0);
         camera.aim = Point2::new(400.0, 0.0);
-        for column in columns(&camera, &SkinOutline::PAPER, &light, &config, None) {
+        for column in columns(&camera, &SkinOutline::PAPER, &light, &config, |lens, d| {
+            (lens, d)
+        }) {
             assert_eq!((column.enter_mm, column.exit_mm), (0.0, 0.0));
             assert!((column.total - config.stray).abs() < 1e-15);
             assert!(column.beyond(10.0).abs() < 1e-15);

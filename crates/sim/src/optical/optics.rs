@@ -19,8 +19,12 @@ impl Optics {
     pub(super) fn new(scene: &SceneConfig, config: OpticalConfig) -> Self {
         let light = Illumination::new(&scene.outline, &config, scene.skin_seed);
         let pod = config.parts.pod_refraction.map(|p| Pod::new(&p, scene));
+        let enter = |lens, d| match &pod {
+            Some(pod) => pod.refract(lens, d),
+            None => (lens, d),
+        };
         Self {
-            columns: light::columns(&scene.camera, &scene.outline, &light, &config, pod.as_ref()),
+            columns: light::columns(&scene.camera, &scene.outline, &light, &config, enter),
             scene: scene.clone(),
             config,
             light,
