@@ -1,7 +1,6 @@
 //! Figures of the scene `paper` beside the published ones, and what each of its parts changes.
 //!
 //! Presses as in `protocols/paper.yaml`, in memory: the robot moves exactly, and the clocks are true.
-#![expect(clippy::print_stdout, reason = "shows the tables that docs state")]
 
 use skinrig_analysis::{Analysis, SessionInput, analyze};
 use skinrig_model::published;

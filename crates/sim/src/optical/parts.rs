@@ -202,6 +202,29 @@ impl Parts {
         }
     }
 
+    /// `scene paper`, with the parts that it lacks; `None` without any part.
+    #[must_use]
+    pub fn label(&self) -> Option<String> {
+        let has = |part: &ScenePart| match part {
+            ScenePart::PressScatter => self.press_scatter.is_some(),
+            ScenePart::WeakPresses => self.weak_presses.is_some(),
+            ScenePart::SlowRecovery => self.slow_recovery.is_some(),
+            ScenePart::PodRefraction => self.pod_refraction.is_some(),
+            ScenePart::UnevenLight => self.uneven_light.is_some(),
+            ScenePart::UnevenPixels => self.uneven_pixels.is_some(),
+            ScenePart::UnevenNoise => self.uneven_noise.is_some(),
+            ScenePart::DarkLatency => self.dark_latency.is_some(),
+            ScenePart::Readout => self.readout.is_some(),
+        };
+        let (on, off): (Vec<_>, Vec<_>) = ScenePart::ALL.into_iter().partition(has);
+        let lacks: Vec<&str> = off.into_iter().map(ScenePart::name).collect();
+        match (on.is_empty(), lacks.is_empty()) {
+            (true, _) => None,
+            (false, true) => Some("scene paper".to_owned()),
+            (false, false) => Some(format!("scene paper without {}", lacks.join(", "))),
+        }
+    }
+
     /// Whether dents differ from press to press.
     pub(super) const fn varies_presses(&self) -> bool {
         self.press_scatter.is_some() || self.weak_presses.is_some()

@@ -130,5 +130,9 @@ mod tests {
             let on: Vec<_> = parts.as_object().unwrap().keys().cloned().collect();
             assert_eq!(on, [part.name()]);
         }
+        assert_eq!(Parts::default().label(), None);
+        assert_eq!(Parts::PAPER.label().as_deref(), Some("scene paper"));
+        let label = Parts::of_paper(&ScenePart::ALL[..8]).label();
+        assert_eq!(label.as_deref(), Some("scene paper without readout"));
     }
 }
