@@ -27,6 +27,7 @@ pub mod digits;
 mod error;
 pub mod estimators;
 mod event_cache;
+pub mod event_statistics;
 mod exact;
 pub mod exclusion;
 pub mod grid;

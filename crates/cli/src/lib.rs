@@ -46,6 +46,7 @@ pub mod rig;
 mod run;
 mod salvage;
 mod sample_size;
+mod scene;
 mod schema;
 pub mod selection;
 mod sense;
@@ -142,6 +143,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Report(a) => analyze::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, output),
+        Command::Scene(a) => scene::scene(a, json),
         Command::Online(a) => online::online(a, output),
         Command::Verify(a) => verify::verify(a, json),
         Command::Salvage(a) => salvage::salvage(a, json),

@@ -30,6 +30,7 @@ use crate::signals::Operator;
 use crate::sink::{ReplayExpectations, SessionSink};
 use crate::terminal::Output;
 use skinrig_results::RigDocument;
+use skinrig_sim::optical::Parts;
 
 /// Header data of a session that do not depend on the rig.
 pub(crate) struct RunInputs<'a> {
@@ -254,7 +255,8 @@ pub(crate) fn simulated(
             .tolerances
             .iter()
             .map(|t| format!("{} within {} {}", t.figure.name(), t.most, t.figure.unit()));
-        let needs: Vec<String> = needs.chain(tolerances).collect();
+        let parts = Parts::of_paper(&scene.parts).label();
+        let needs: Vec<String> = needs.chain(tolerances).chain(parts).collect();
         let needed_for = if needs.is_empty() {
             String::new()
         } else {

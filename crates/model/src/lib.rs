@@ -19,6 +19,7 @@ pub mod pose;
 pub mod preflight;
 pub mod press;
 mod press_fault;
+pub mod published;
 pub mod pulse;
 pub mod quantile;
 pub mod reason;
@@ -65,7 +66,7 @@ pub use record::{
 pub use remount::RemountSettings;
 pub use rig_fault::{RigFault, UnsupportedFault};
 pub use run_end::{RunEnd, StopReason};
-pub use scene::{SceneNeed, SimLevel};
+pub use scene::{SceneNeed, ScenePart, SimLevel};
 pub use selection::{SelectedOut, SelectionReason};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,

@@ -65,6 +65,73 @@ impl FromStr for SimLevel {
     }
 }
 
+/// Physics that the optical level adds when a scene lists it.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    skinrig_settings::Choice,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum ScenePart {
+    /// The dent lies beside the tip and is deeper or shallower, otherwise in each press.
+    PressScatter,
+    /// Some presses dent the skin little.
+    WeakPresses,
+    /// The skin keeps a part of the last dents for seconds.
+    SlowRecovery,
+    /// Rays bend where they leave the skin for the lens.
+    PodRefraction,
+    /// Emitters differ in power, and the skin is cloudier in places.
+    UnevenLight,
+    /// Pixels differ in threshold and refractory time.
+    UnevenPixels,
+    /// Noise comes from few pixels.
+    UnevenNoise,
+    /// Dark pixels respond later.
+    DarkLatency,
+    /// Events wait until the sensor reads their row.
+    Readout,
+}
+
+impl ScenePart {
+    /// All parts.
+    pub const ALL: [Self; 9] = [
+        Self::PressScatter,
+        Self::WeakPresses,
+        Self::SlowRecovery,
+        Self::PodRefraction,
+        Self::UnevenLight,
+        Self::UnevenPixels,
+        Self::UnevenNoise,
+        Self::DarkLatency,
+        Self::Readout,
+    ];
+
+    /// The name used in protocols and sessions.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PressScatter => "press_scatter",
+            Self::WeakPresses => "weak_presses",
+            Self::SlowRecovery => "slow_recovery",
+            Self::PodRefraction => "pod_refraction",
+            Self::UnevenLight => "uneven_light",
+            Self::UnevenPixels => "uneven_pixels",
+            Self::UnevenNoise => "uneven_noise",
+            Self::DarkLatency => "dark_latency",
+            Self::Readout => "readout",
+        }
+    }
+}
+
 /// A property of the simulated session that its user relies on.
 #[derive(
     Debug,

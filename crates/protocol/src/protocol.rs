@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 use skinrig_model::{
     AnalysisSettings, CameraModel, HostDuration, MarkKind, Point2, Point3, PressRole, SceneNeed,
-    SimLevel, Skin, level_bias::Tolerance,
+    ScenePart, SimLevel, Skin, level_bias::Tolerance,
 };
 
 use skinrig_settings::{Location, Settings};
@@ -125,6 +125,9 @@ pub struct Scene {
     pub tolerances: Vec<Tolerance>,
     /// True if the protocol sets the level explicitly.
     pub level_is_named: bool,
+    /// Physics added to the optical level.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<ScenePart>,
     /// The skin, if it differs from the published one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SimulatedSkin>,

@@ -19,6 +19,7 @@ pub mod night;
 pub mod page;
 pub mod provenance;
 pub mod published;
+pub mod scene_check;
 pub mod style;
 pub mod svg;
 pub mod tradeoff;

@@ -6,26 +6,15 @@
 
 use serde::Serialize;
 
-/// Localisation RMSE without reduction, mm (section 3.1).
-pub(crate) const RMSE_MM: f64 = 4.66;
-/// Localisation RMSE along x, mm (section 3.1).
-pub(crate) const RMSE_X_MM: f64 = 4.17;
-/// Localisation RMSE along y, mm (section 3.1).
-pub(crate) const RMSE_Y_MM: f64 = 3.28;
-/// Mean standard deviation between repetitions, mm (section 3.1).
-pub(crate) const REPEAT_STD_MM: f64 = 2.85;
-/// RMSE at 1024-fold reduction, mm (abstract).
-pub(crate) const RMSE_1024_MM: f64 = 9.33;
-/// Pass rate without reduction (section 3.1), and at 1024-fold reduction (abstract).
-pub const PASS_RATE: (f64, f64) = (0.95, 0.85);
+pub use skinrig_model::published::PASS_RATE;
+pub(crate) use skinrig_model::published::{
+    DETECTED_RATE, FALSE_ALARMS_PER_S, REPEAT_STD_MM, RMSE_1024_MM, RMSE_MM, RMSE_X_MM, RMSE_Y_MM,
+};
+
 /// Area of the skin, area seen by both cameras, probed area, mm² (section 3.1).
 pub(crate) const AREAS_MM2: [f64; 3] = [9328.0, 8763.0, 4620.0];
 /// Effective taxels over the sensor and over the probed area, without reduction (table "MSOWS").
 pub(crate) const TAXELS: (f64, f64) = (105.0, 46.0);
-/// False alarms per second: without reduction, and at 1024-fold reduction (section 3.2).
-pub(crate) const FALSE_ALARMS_PER_S: (f64, f64) = (0.13, 1.86);
-/// Share of trials detected, at the same reductions: target without reduction, result at 1024 (section 3.2).
-pub(crate) const DETECTED_RATE: (f64, f64) = (0.95, 0.88);
 
 /// A note below a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -101,6 +101,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut models = CameraId::ALL.map(|id| {
         OpticalModel::new(&SceneConfig {
             seed: 7 + id.index() as u64,
+            skin_seed: 7,
             start: 0,
             outline: SkinOutline::PAPER,
             camera_id: id,

@@ -218,6 +218,7 @@ impl SimConfig {
     pub fn scene(&self, camera: CameraId) -> SceneConfig {
         SceneConfig {
             seed: crate::random::derive_seed(self.seed, Purpose::Pixels, camera.index() as u64),
+            skin_seed: crate::random::derive_seed(self.seed, Purpose::Skin, 0),
             start: 0,
             outline: self.outline,
             camera_id: camera,

@@ -19,6 +19,8 @@ pub enum Purpose {
     Pixels = 20,
     /// Properties of contacts, by location and number.
     Contacts = 30,
+    /// Properties of the skin and its light, which both cameras see.
+    Skin = 40,
 }
 
 /// Seed of a stream: mixes `seed` and purpose (SplitMix64's finaliser); `index` distinguishes instances.

@@ -32,7 +32,7 @@ pub fn simulated_rig(config: &SimConfig) -> Rig {
     let trigger_box: Box<dyn TriggerBox> = Box::new(SimTriggerBox::new(config, shared.clone()));
     Rig {
         kind: "simulated".to_owned(),
-        name: format!("simulated ({})", config.level),
+        name: name(config),
         indenter: Box::new(SimIndenter::new(config, shared.clone())),
         cameras: CameraId::ALL.map(camera),
         camera_settings: [settings.clone(), settings],
@@ -57,6 +57,15 @@ pub fn simulated_rig(config: &SimConfig) -> Rig {
 pub fn in_real_time(mut rig: Rig) -> Rig {
     rig.clock = Box::new(PacedClock::new(BoxedClock(rig.clock)));
     rig
+}
+
+/// Level and scene.
+fn name(config: &SimConfig) -> String {
+    let is_optical = config.level == SimLevel::Optical;
+    match config.optical.parts.label().filter(|_| is_optical) {
+        Some(scene) => format!("simulated ({}, {scene})", config.level),
+        None => format!("simulated ({})", config.level),
+    }
 }
 
 fn pixel_factory(config: &SimConfig, id: CameraId) -> PixelFactory {

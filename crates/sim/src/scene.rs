@@ -49,6 +49,8 @@ pub trait PixelModel: Send {
 pub struct SceneConfig {
     /// Seed of all random numbers of this camera's pixels.
     pub seed: u64,
+    /// Seed of what both cameras see: the skin, its light, the presses.
+    pub skin_seed: u64,
     /// Number of earlier starts of the camera. Each start has its own noise; pixel properties, such as hot pixels, stay.
     pub start: u64,
     /// The skin.

@@ -11,4 +11,5 @@ mod multi_touch;
 mod numerics;
 mod online;
 mod overflow;
+mod paper_scene;
 mod retakes;

@@ -26,6 +26,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "compare",
             "tradeoff",
             "online",
+            "scene",
             "prototypes",
         ],
     ),

@@ -6,6 +6,7 @@ mod doctor;
 mod evaluate;
 mod files;
 mod groups;
+mod scene;
 mod values;
 
 use std::path::PathBuf;
@@ -29,6 +30,7 @@ pub(crate) use self::files::{
     SalvageArgs, SchemaArgs, SchemaKind, SelectArgs, SessionsArgs, ShowArgs, TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
+pub(crate) use self::scene::{SceneArgs, SceneCheckArgs, SceneCommand};
 pub(crate) use self::values::StopRule;
 use crate::catalogue::args::CatalogueArgs;
 use crate::exit::Exit;
@@ -202,6 +204,10 @@ pub(crate) enum Command {
         skinrig tradeoff sessions/NAME.session.sqlite --target-rmse 6mm --budget 100us"
     )]
     Tradeoff(TradeoffArgs),
+
+    /// Check how like a camera the events of a session are.
+    #[command(after_help = "Example:\n  skinrig scene check sessions/NAME.session.sqlite")]
+    Scene(SceneArgs),
 
     /// Replay a session as a live source: how soon touches are felt, where, and how often wrongly.
     #[command(

@@ -67,6 +67,7 @@ const QUICK_CHECK: StarterFile = same!("protocols/quick-check.yaml");
 const RINGS: StarterFile = same!("protocols/circles.yaml");
 const OWN_OUTLINE: StarterFile = same!("protocols/own-outline.yaml");
 const OWN_CAMERAS: StarterFile = same!("protocols/own-cameras.yaml");
+const PAPER_SCENE: StarterFile = same!("protocols/paper.yaml");
 const OTHER_SKIN: StarterFile = same!("protocols/other-skin.yaml");
 
 /// Schema of protocols, for editors.
@@ -86,6 +87,7 @@ pub(super) const LAB: &[StarterFile] = &[
     OWN_OUTLINE,
     OWN_CAMERAS,
     OTHER_SKIN,
+    PAPER_SCENE,
     same!("protocols/comparison.limits.yaml"),
     PROTOCOL_SCHEMA,
     StarterFile::generated(
@@ -132,6 +134,8 @@ pub(crate) enum ProtocolKind {
     OwnCameras,
     /// A simulated skin that differs from the published one
     OtherSkin,
+    /// A simulated skin that resembles the published one
+    Paper,
     /// The demonstration: a 9 x 9 grid, three times
     Demo,
 }
@@ -154,6 +158,7 @@ impl ProtocolKind {
             Self::OwnOutline => OWN_OUTLINE,
             Self::OwnCameras => OWN_CAMERAS,
             Self::OtherSkin => OTHER_SKIN,
+            Self::Paper => PAPER_SCENE,
             Self::Demo => DEMO,
         }
     }

@@ -14,7 +14,7 @@ use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, Clock, Rig};
 use skinrig_model::{HostTime, InterruptionKind, Point2, RunHeader, SimLevel, StereoGeometry};
 use skinrig_protocol::{PlantedFault, Protocol};
-use skinrig_sim::optical::OpticalConfig;
+use skinrig_sim::optical::{OpticalConfig, Parts};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 
@@ -50,6 +50,7 @@ pub(crate) fn simulated_after(
         ..SimConfig::new(seed, level)
     };
     config.outline = protocol.surroundings.outline;
+    config.optical.parts = Parts::of_paper(&protocol.scene.parts);
     if let Some(skin) = protocol.scene.skin {
         config.skin_thickness_mm = skin.thickness_mm;
         config.optical = OpticalConfig {

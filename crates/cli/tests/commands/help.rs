@@ -2,7 +2,7 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 31] = [
+const COMMANDS: [&str; 32] = [
     "init",
     "new",
     "doctor",
@@ -27,6 +27,7 @@ const COMMANDS: [&str; 31] = [
     "inspect",
     "schema",
     "tradeoff",
+    "scene",
     "compare",
     "watch",
     "view",

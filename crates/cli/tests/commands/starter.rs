@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::support::{Lab, ProgramOutput, only, program, run_to_end};
 
-const KINDS: [&str; 9] = [
+const KINDS: [&str; 10] = [
     "campaign",
     "comparison",
     "depth-sweep",
@@ -13,6 +13,7 @@ const KINDS: [&str; 9] = [
     "own-outline",
     "own-cameras",
     "other-skin",
+    "paper",
     "demo",
 ];
 

@@ -1,7 +1,7 @@
 //! Keys of the simulated scene.
 
 use skinrig_model::level_bias::{LevelBias, SceneFigure, Tolerance, cheapest_level, level_bias};
-use skinrig_model::{HostDuration, Point2, SceneNeed, SimLevel};
+use skinrig_model::{HostDuration, Point2, SceneNeed, ScenePart, SimLevel};
 use skinrig_settings::{Collector, Field, Settings};
 
 use super::camera::NominalCamera;
@@ -22,6 +22,10 @@ pub(crate) struct SceneKeys {
     tolerances: Option<ToleranceKeys>,
     /// The simulation level outright; must be sufficient for `needs` and `tolerances`.
     level: Option<SimLevel>,
+    /// Physics added to the optical level, fitted to the published figures (protocols/paper.md). All of it is the
+    /// scene `paper`.
+    #[setting(items = 1..=9, example = "[press_scatter, uneven_noise]")]
+    parts: Option<Vec<ScenePart>>,
     /// A skin other than the published one. Needs the optical level.
     skin: Option<SkinKeys>,
     /// Cameras at other places than in the published setup.
@@ -114,7 +118,8 @@ impl SceneKeys {
         let tolerances = tolerances.unwrap_or_default();
         // Differences are measured for the published cameras only.
         let unmeasured = self.cameras.is_some() && !tolerances.is_empty();
-        let own_level = (self.skin.is_some() || unmeasured).then_some(SimLevel::Optical);
+        let is_optical = self.skin.is_some() || self.parts.is_some();
+        let own_level = (is_optical || unmeasured).then_some(SimLevel::Optical);
         Scene {
             level: self
                 .level
@@ -123,6 +128,7 @@ impl SceneKeys {
             needs,
             tolerances,
             level_is_named: self.level.is_some(),
+            parts: self.parts.unwrap_or_default(),
             skin: self.skin.map(SkinKeys::skin),
             cameras: self
                 .cameras
@@ -139,13 +145,26 @@ impl SceneKeys {
                     .found(format!("`{}`", need.name()));
             }
         }
+        let parts = self.parts.as_deref().unwrap_or_default();
+        for (i, (part, item)) in parts.iter().zip(field.at("parts").items()).enumerate() {
+            if parts.iter().take(i).any(|earlier| earlier == part) {
+                out.error(item.span, item.path.as_str(), "the part is given twice")
+                    .expected("each part once")
+                    .found(format!("`{}`", part.name()));
+            }
+        }
+        let optical_key = match (&self.skin, &self.parts) {
+            (Some(_), _) => Some("skin"),
+            (None, Some(_)) => Some("parts"),
+            (None, None) => None,
+        };
         if let Some(level) = self.level
             && level < SimLevel::Optical
-            && self.skin.is_some()
+            && let Some(key) = optical_key
         {
             let at = field.at("level");
             out.error(at.span, "scene.level", "this level does not model the skin")
-                .expected("`optical`, because of `scene.skin`")
+                .expected(format!("`optical`, because of `scene.{key}`"))
                 .found(format!("`{level}`"))
                 .help("write `level: optical`, or remove the key: the cheapest sufficient level is chosen");
         }

@@ -1,6 +1,6 @@
 //! The simulation level that needs and tolerances of a scene choose.
 
-use skinrig_model::SimLevel;
+use skinrig_model::{ScenePart, SimLevel};
 
 use crate::common::{parse, shipped};
 
@@ -40,6 +40,7 @@ fn the_cheapest_level_within_needs_and_tolerances_is_taken() {
             "needs: [latency]\n  tolerances: {event_rate: 30 %}",
             Optical,
         ),
+        ("parts: [readout]", Optical),
         (CAMERAS, Geometric),
         // Differences are measured for the published cameras only.
         (
@@ -49,4 +50,38 @@ fn the_cheapest_level_within_needs_and_tolerances_is_taken() {
     ] {
         assert_eq!(level(scene), expected, "{scene}");
     }
+}
+
+#[test]
+fn parts_are_listed_once_and_need_the_optical_level() {
+    let parsed = |scene: &str| {
+        let text = shipped("demo.yaml").replace(
+            "  needs: [event_rates, localisation, optical_error]\n",
+            &format!("  {scene}\n"),
+        );
+        parse(&text, &[])
+    };
+    let found = parsed("parts: [readout, weak_presses]")
+        .unwrap()
+        .scene
+        .parts;
+    assert_eq!(found, [ScenePart::Readout, ScenePart::WeakPresses]);
+    for (scene, expected) in [
+        ("parts: [readout, readout]", "each part once"),
+        (
+            "parts: [readout]\n  level: geometric",
+            "because of `scene.parts`",
+        ),
+        ("parts: [read_out]", "did you mean"),
+    ] {
+        let error = parsed(scene).unwrap_err().to_string();
+        assert!(error.contains(expected), "{scene}: {error}");
+    }
+}
+
+#[test]
+fn the_shipped_scene_of_the_paper_has_every_part() {
+    let protocol = parse(&shipped("paper.yaml"), &[]).unwrap();
+    assert_eq!(protocol.scene.parts, ScenePart::ALL);
+    assert_eq!(protocol.scene.level, SimLevel::Optical);
 }

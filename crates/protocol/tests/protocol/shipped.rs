@@ -6,12 +6,13 @@ use crate::common::{folder, no_file, parse, shipped};
 use crate::validate::validate;
 use skinrig_protocol::{Protocol, Schedule, check, path_svg, schedule_schema_json, schema_json};
 
-const PROTOCOLS: [&str; 9] = [
+const PROTOCOLS: [&str; 10] = [
     "comparison",
     "other-skin",
     "own-cameras",
     "own-outline",
     "demo",
+    "paper",
     "paper-meander",
     "circles",
     "depth-sweep",

@@ -3,6 +3,8 @@
 use serde::Serialize;
 use thiserror::Error;
 
+use super::parts::Parts;
+
 /// A setting outside its valid range.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("expected optical.{name} {expected}, found {found}; correct the setting or leave it out")]
@@ -88,6 +90,10 @@ pub struct OpticalConfig {
     pub hot_hz: f64,
     /// Rate of each hot pixel as a fraction of the next hotter one's.
     pub hot_ratio: f64,
+
+    /// Physics beyond this model.
+    #[serde(flatten)]
+    pub parts: Parts,
 }
 
 impl Default for OpticalConfig {
@@ -119,6 +125,7 @@ impl Default for OpticalConfig {
             hot_pixels: 8,
             hot_hz: 300.0,
             hot_ratio: 0.45,
+            parts: Parts::default(),
         }
     }
 }
@@ -133,6 +140,21 @@ impl OpticalConfig {
             shot_hz: 0.0,
             hot_pixels: 0,
             ..self
+        }
+    }
+
+    /// With the noise of the part, if it is on.
+    pub(super) const fn with_uneven_noise(self) -> Self {
+        match self.parts.uneven_noise {
+            None => self,
+            Some(noise) => Self {
+                leak_hz: noise.leak_hz,
+                shot_hz: noise.shot_hz,
+                hot_pixels: noise.hot_pixels,
+                hot_hz: noise.hot_hz,
+                hot_ratio: noise.hot_ratio,
+                ..self
+            },
         }
     }
 

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use skinrig_model::{CameraModel, SENSOR_WIDTH};
+use skinrig_model::SENSOR_WIDTH;
 
 use crate::scene::SceneConfig;
 
@@ -92,13 +92,12 @@ impl Dent {
             columns,
         } = optics;
         let shape = DentShape::new(scene, config);
-        let camera = &scene.camera;
         let lit = flank_light(light, place);
         let width = columns.len();
         let (mut loss_per_mm, mut shadow, mut shine) =
             (vec![0.0; width], vec![0.0; width], vec![0.0; width]);
         for (u, column) in columns.iter().enumerate() {
-            let crossing = cross(&shape, config, camera, column, place, &lit);
+            let crossing = cross(&shape, config, column, place, &lit);
             if crossing.loss_per_mm < LEAST_LOSS_PER_MM {
                 continue;
             }
@@ -145,16 +144,12 @@ struct Crossing {
 fn cross(
     shape: &DentShape,
     config: &OpticalConfig,
-    camera: &CameraModel,
     column: &Column,
     place: Vec2,
     lit: &[f64; FLANK_DIRECTIONS],
 ) -> Crossing {
     let d = column.direction;
-    let to = [
-        place[0] - camera.position.x_mm,
-        place[1] - camera.position.y_mm,
-    ];
+    let to = [place[0] - column.origin[0], place[1] - column.origin[1]];
     let along = dot(to, d);
     let half_chord_square = shape.reach_mm() * shape.reach_mm() - (dot(to, to) - along * along);
     let nearest_mm = along.max(column.enter_mm).min(column.exit_mm);

@@ -6,7 +6,10 @@
 
 use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH, SkinOutline};
 
+use crate::random::{Purpose, Stream};
+
 use super::config::OpticalConfig;
+use super::parts::UnevenLight;
 
 /// Spacing of the points at which a ray is followed, mm, or a little less.
 const RAY_STEP_MM: f64 = 4.0;
@@ -29,6 +32,8 @@ fn length(a: Vec2) -> f64 {
 pub(super) struct Emitter {
     pub(super) at: Vec2,
     pub(super) axis: Vec2,
+    /// Power relative to the mean emitter's.
+    pub(super) power: f64,
 }
 
 /// The light of all emitters.
@@ -38,12 +43,15 @@ pub(super) struct Illumination {
     /// Exponent of the lobe `cos^n`.
     lobe: f64,
     attenuation_per_mm: f64,
+    cloud: Option<Cloud>,
 }
 
 impl Illumination {
     /// Emitters evenly spaced along the edges at small and large y and small x (the edge at large x has the
     /// cameras), each aimed at the middle of the camera edge (paper, section "Sensor Design").
-    pub(super) fn new(outline: &SkinOutline, config: &OpticalConfig) -> Self {
+    pub(super) fn new(outline: &SkinOutline, config: &OpticalConfig, skin_seed: u64) -> Self {
+        let uneven = config.parts.uneven_light;
+        let mut random = Stream::new(skin_seed, Purpose::Skin, 1);
         let path = emitter_path(outline);
         let total: f64 = path.windows(2).map(|w| distance(w[0], w[1])).sum();
         let target = [
@@ -57,6 +65,7 @@ impl Illumination {
                 Some(Emitter {
                     at,
                     axis: unit([target[0] - at[0], target[1] - at[1]])?,
+                    power: uneven.map_or(1.0, |u| libm::exp(u.emitters * random.gauss())),
                 })
             })
             .collect();
@@ -67,19 +76,21 @@ impl Illumination {
             emitters,
             lobe,
             attenuation_per_mm: config.attenuation_per_mm,
+            cloud: uneven.map(|u| Cloud::new(&u, skin_seed)),
         }
     }
 
-    /// Intensity of `emitter` in the unit direction `d`, 1 on its axis.
+    /// Intensity of `emitter` in the unit direction `d`, its power on its axis.
     fn lobe(&self, emitter: &Emitter, d: Vec2) -> f64 {
         let c = dot(emitter.axis, d);
-        if c <= 0.0 {
-            0.0
-        } else if (self.lobe - 1.0).abs() < 1e-9 {
-            c
-        } else {
-            libm::pow(c, self.lobe)
-        }
+        emitter.power
+            * if c <= 0.0 {
+                0.0
+            } else if (self.lobe - 1.0).abs() < 1e-9 {
+                c
+            } else {
+                libm::pow(c, self.lobe)
+            }
     }
 
     /// Light of one emitter at `p`: direction of travel and fluence (per mm: light spreads in a
@@ -94,8 +105,13 @@ impl Illumination {
         )
     }
 
-    fn fluence(&self, p: Vec2) -> f64 {
-        self.emitters.iter().map(|e| self.at(e, p).1).sum()
+    /// Fluence at `p`, weighted with the scattering there.
+    fn scattered(&self, p: Vec2) -> f64 {
+        let fluence = self.emitters.iter().map(|e| self.at(e, p).1).sum();
+        match &self.cloud {
+            Some(cloud) => cloud.at(p) * fluence,
+            None => fluence,
+        }
     }
 
     /// Radiance of the wall at `p` towards the unit direction `d`: emitters near `p`, blurred.
@@ -113,12 +129,51 @@ impl Illumination {
     }
 }
 
+/// Scattering of a skin that is cloudier in places, relative to its mean: the exponential of a sum of waves.
+#[derive(Debug, Clone)]
+struct Cloud {
+    /// Wave vector, 1/mm, and phase.
+    waves: Vec<(Vec2, f64)>,
+    amplitude: f64,
+}
+
+impl Cloud {
+    const WAVES: u32 = 12;
+
+    fn new(uneven: &UnevenLight, skin_seed: u64) -> Self {
+        let mut random = Stream::new(skin_seed, Purpose::Skin, 2);
+        let tau = 2.0 * core::f64::consts::PI;
+        let waves = (0..Self::WAVES)
+            .map(|_| {
+                let (sin, cos) = libm::sincos(tau * random.unit());
+                let k = tau / (uneven.cloud_mm * random.between(0.7, 1.5));
+                ([k * cos, k * sin], tau * random.unit())
+            })
+            .collect();
+        Self {
+            waves,
+            amplitude: uneven.cloud * (2.0 / f64::from(Self::WAVES)).sqrt(),
+        }
+    }
+
+    fn at(&self, p: Vec2) -> f64 {
+        let sum: f64 = self
+            .waves
+            .iter()
+            .map(|(k, phase)| libm::cos(dot(*k, p) + phase))
+            .sum();
+        libm::exp(self.amplitude * sum)
+    }
+}
+
 /// Light that one column of the camera receives from the undisturbed skin.
 #[derive(Debug, Clone)]
 pub(super) struct Column {
+    /// Where the ray begins: the camera, or where it leaves the camera's pod.
+    pub(super) origin: Vec2,
     /// Unit direction of the ray, away from the camera.
     pub(super) direction: Vec2,
-    /// Where the ray is inside the skin, mm from the camera; `enter == exit` when it misses the skin.
+    /// Where the ray is inside the skin, mm from its origin; `enter == exit` when it misses the skin.
     pub(super) enter_mm: f64,
     pub(super) exit_mm: f64,
     /// Light from the wall at the end of the ray, as it arrives.
@@ -137,9 +192,11 @@ impl Column {
         outline: &SkinOutline,
         light: &Illumination,
         config: &OpticalConfig,
+        enter: impl Fn(Vec2, Vec2) -> (Vec2, Vec2),
     ) -> Self {
         let direction = camera.direction(camera.angle_of_column_deg(f64::from(x)));
         let origin = [camera.position.x_mm, camera.position.y_mm];
+        let (origin, direction) = enter(origin, direction);
         let at = |s: f64| [origin[0] + s * direction[0], origin[1] + s * direction[1]];
         let (enter_mm, exit_mm) = inside(
             outline,
@@ -153,7 +210,7 @@ impl Column {
         let mut sum = 0.0;
         for k in 0..steps as u32 {
             let middle = enter_mm + (f64::from(k) + 0.5) * step_mm;
-            sum += config.scatter_per_mm * step_mm * light.fluence(at(middle)) * fade(middle);
+            sum += config.scatter_per_mm * step_mm * light.scattered(at(middle)) * fade(middle);
             scattered.push(sum);
         }
         let towards_camera = [-direction[0], -direction[1]];
@@ -163,6 +220,7 @@ impl Column {
             0.0
         };
         Self {
+            origin,
             direction,
             enter_mm,
             exit_mm,
@@ -185,15 +243,16 @@ impl Column {
     }
 }
 
-/// All columns of the camera.
+/// All columns of the camera. `enter` gives the origin and direction in the skin of a ray that leaves the lens.
 pub(super) fn columns(
     camera: &CameraModel,
     outline: &SkinOutline,
     light: &Illumination,
     config: &OpticalConfig,
+    enter: impl Fn(Vec2, Vec2) -> (Vec2, Vec2),
 ) -> Vec<Column> {
     (0..SENSOR_WIDTH)
-        .map(|x| Column::new(camera, x, outline, light, config))
+        .map(|x| Column::new(camera, x, outline, light, config, &enter))
         .collect()
 }
 
@@ -287,7 +346,7 @@ mod tests {
     #[test]
     fn emitters_sit_on_the_three_edges_without_cameras() {
         let skin = SkinOutline::PAPER;
-        let light = Illumination::new(&skin, &OpticalConfig::default());
+        let light = Illumination::new(&skin, &OpticalConfig::default(), 0);
         assert_eq!(light.emitters.len(), 32);
         for e in &light.emitters {
             let p = Point2::new(e.at[0], e.at[1]);
@@ -310,10 +369,11 @@ mod tests {
             half_intensity_deg: 35.0,
             ..OpticalConfig::default()
         };
-        let light = Illumination::new(&SkinOutline::PAPER, &config);
+        let light = Illumination::new(&SkinOutline::PAPER, &config, 0);
         let e = Emitter {
             at: [0.0, 0.0],
             axis: [1.0, 0.0],
+            power: 1.0,
         };
         let (sin, cos) = libm::sincos(35.0_f64.to_radians());
         assert!((light.lobe(&e, [cos, sin]) - 0.5).abs() < 1e-12);
@@ -325,9 +385,12 @@ mod tests {
     fn rays_end_on_the_outline_and_their_light_adds_up() {
         let skin = SkinOutline::PAPER;
         let config = OpticalConfig::default();
-        let light = Illumination::new(&skin, &config);
+        let light = Illumination::new(&skin, &config, 0);
         for camera in StereoGeometry::PAPER.cameras {
-            for column in columns(&camera, &skin, &light, &config).iter().step_by(37) {
+            for column in columns(&camera, &skin, &light, &config, |lens, d| (lens, d))
+                .iter()
+                .step_by(37)
+            {
                 let [dx, dy] = column.direction;
                 let end = Point2::new(
                     camera.position.x_mm + column.exit_mm * dx,
@@ -352,11 +415,13 @@ mod tests {
     #[test]
     fn a_camera_that_looks_away_sees_only_stray_light() {
         let config = OpticalConfig::default();
-        let light = Illumination::new(&SkinOutline::PAPER, &config);
+        let light = Illumination::new(&SkinOutline::PAPER, &config, 0);
         let mut camera = StereoGeometry::PAPER.cameras[0];
         camera.position = Point2::new(300.0, 0.0);
         camera.aim = Point2::new(400.0, 0.0);
-        for column in columns(&camera, &SkinOutline::PAPER, &light, &config) {
+        for column in columns(&camera, &SkinOutline::PAPER, &light, &config, |lens, d| {
+            (lens, d)
+        }) {
             assert_eq!((column.enter_mm, column.exit_mm), (0.0, 0.0));
             assert!((column.total - config.stray).abs() < 1e-15);
             assert!(column.beyond(10.0).abs() < 1e-15);

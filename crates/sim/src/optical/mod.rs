@@ -6,7 +6,8 @@
 //! optics. Formulas, constants and limits: `docs/explanation/optical-model.md`.
 //!
 //! Data flow: `light` (once) -> `dent` (once per touched place) -> `touches` (the dents of this millisecond, those
-//! that a tip has left among them) -> `column` (their light, row by row) -> `pixels`. `noise` is added independently.
+//! that a tip has left among them) -> `column` (their light, row by row) -> `pixels`. `noise` is added independently;
+//! `readout` delays. `parts` lists what is off in the base model.
 
 mod column;
 mod config;
@@ -15,15 +16,24 @@ mod dent;
 mod light;
 mod noise;
 mod optics;
+mod parts;
+#[cfg(test)]
+mod parts_tests;
 mod pixels;
+mod pod;
+mod readout;
 mod refractory;
 #[cfg(test)]
 mod several_tests;
+mod sources;
 #[cfg(test)]
 mod tests;
 mod touches;
+mod variation;
 
 pub use config::{InvalidOpticalSetting, OpticalConfig};
+pub use parts::Parts;
+pub use sources::{PARAMETERS, Parameter, Source};
 
 use skinrig_model::{Point3, Skin};
 
@@ -33,6 +43,7 @@ use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 use noise::Noise;
 use optics::Optics;
 use pixels::Pixels;
+use readout::Output;
 use touches::Touches;
 
 /// Pixels of one camera over the optically modelled skin.
@@ -42,6 +53,7 @@ pub struct OpticalModel {
     touches: Touches,
     pixels: Pixels,
     noise: Noise,
+    output: Output,
     first_ns: i64,
     last: Option<(i64, Vec<Point3<Skin>>)>,
 }
@@ -90,6 +102,7 @@ impl OpticalModel {
             optics,
             pixels,
             noise,
+            output: Output::new(&config),
             first_ns: 0,
             last: None,
         }
@@ -131,7 +144,7 @@ impl OpticalModel {
         self.pixels.step(&mut self.touches, t_ns, out);
         self.noise
             .step(t_ns, t_ns - self.first_ns, &mut self.pixels, out);
-        out[begin..].sort_unstable_by_key(|e| (e.t_ns, e.y, e.x, e.polarity.bit()));
+        self.output.pass(&self.noise, t_ns + GRID_NS, begin, out);
     }
 }
 

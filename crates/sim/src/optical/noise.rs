@@ -15,6 +15,9 @@ pub(super) struct Noise {
     random: Stream,
     leak_total_hz: f64,
     shot_total_hz: f64,
+    /// Rows beside the skin, and the events of their pixels.
+    dark_rows: Vec<u16>,
+    dark_total_hz: f64,
     hot: Vec<(u16, u16, f64)>,
     total_hz: f64,
     /// Brightness of each column and row of the undisturbed image; their product is 1 at the brightest pixel.
@@ -43,6 +46,8 @@ fn below(random: &mut Stream, n: u16) -> u16 {
 
 impl Noise {
     pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig, columns: &[Column]) -> Self {
+        let dark_hz = config.parts.uneven_noise.map_or(0.0, |noise| noise.dark_hz);
+        let config = &config.with_uneven_noise();
         let mut random = Stream::new(scene.seed, Purpose::Pixels, 2);
         let brightest = columns
             .iter()
@@ -67,6 +72,10 @@ impl Noise {
         }
         let pixels = f64::from(SENSOR_WIDTH) * f64::from(SENSOR_HEIGHT);
         let (leak_total_hz, shot_total_hz) = (config.leak_hz * pixels, config.shot_hz * weights);
+        let dark_rows: Vec<u16> = (0..SENSOR_HEIGHT)
+            .filter(|v| !scene.rows().contains(&usize::from(*v)))
+            .collect();
+        let dark_total_hz = dark_hz * f64::from(SENSOR_WIDTH) * dark_rows.len() as f64;
         let mut rate = config.hot_hz;
         let hot: Vec<_> = (0..config.hot_pixels)
             .map(|_| {
@@ -82,11 +91,14 @@ impl Noise {
         if scene.start > 0 {
             random = Stream::new(scene.seed_of_start(), Purpose::Pixels, 2);
         }
-        let total_hz = leak_total_hz + shot_total_hz + hot.iter().map(|h| h.2).sum::<f64>();
+        let total_hz =
+            leak_total_hz + shot_total_hz + hot.iter().map(|h| h.2).sum::<f64>() + dark_total_hz;
         let mut noise = Self {
             random,
             leak_total_hz,
             shot_total_hz,
+            dark_rows,
+            dark_total_hz,
             hot,
             total_hz,
             column_light,
@@ -102,6 +114,11 @@ impl Noise {
     /// Expected events per second before refractory times, all pixels together.
     pub(super) const fn total_hz(&self) -> f64 {
         self.total_hz
+    }
+
+    /// Brightness of a pixel in the undisturbed image, above 0 to 1.
+    pub(super) fn brightness(&self, x: u16, y: u16) -> f64 {
+        self.column_light[usize::from(x)] * self.row_light[usize::from(y)]
     }
 
     fn wait(&mut self) {
@@ -148,6 +165,12 @@ impl Noise {
         }
         pick -= self.leak_total_hz;
         let polarity = Polarity::from_bit(self.random.unit() < 0.5);
+        if pick < self.dark_total_hz {
+            let row = below(&mut self.random, self.dark_rows.len() as u16);
+            let x = below(&mut self.random, SENSOR_WIDTH);
+            return (x, self.dark_rows[usize::from(row)], polarity);
+        }
+        pick -= self.dark_total_hz;
         if pick >= self.shot_total_hz {
             pick -= self.shot_total_hz;
             for &(x, y, rate) in &self.hot {

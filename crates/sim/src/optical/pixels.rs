@@ -14,7 +14,7 @@ use crate::scene::{GRID_NS, PixelEvent, SceneConfig};
 
 use super::column::{Block, ColumnLight, LANES, Rows, crossed_blocks, least_slack, lesser};
 use super::config::OpticalConfig;
-use super::refractory::Refractory;
+use super::refractory::{Refractory, RefractoryTimes};
 use super::touches::Touches;
 
 const NS_PER_US: i64 = 1_000;
@@ -31,7 +31,7 @@ pub(super) struct Pixels {
     blocks: usize,
     pixels: Vec<Block>,
     refractory: Refractory,
-    refractory_ns: i64,
+    refractory_us: RefractoryTimes,
     /// Per column: least change of its lost light since the last evaluation that can cause an event.
     slack: Vec<f32>,
     /// No column has an event before one has lost or regained so much light.
@@ -43,6 +43,14 @@ pub(super) struct Pixels {
 
 impl Pixels {
     pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig, random: &mut Stream) -> Self {
+        let [on, off, sigma] = match config.parts.uneven_pixels {
+            Some(p) => [p.threshold, p.threshold, p.threshold_sigma],
+            None => [
+                config.threshold_on,
+                config.threshold_off,
+                config.threshold_sigma,
+            ],
+        };
         let rows = scene.rows();
         let blocks = rows.len().div_ceil(LANES);
         let silent = Block {
@@ -51,12 +59,8 @@ impl Pixels {
         };
         let mut all = vec![silent; WIDTH * blocks];
         for i in 0..WIDTH * rows.len() {
-            let mut threshold =
-                |mean: f64| (mean + config.threshold_sigma * random.gauss()).max(LEAST_THRESHOLD);
-            let (rise, fall) = (
-                threshold(config.threshold_on),
-                threshold(config.threshold_off),
-            );
+            let mut threshold = |mean: f64| (mean + sigma * random.gauss()).max(LEAST_THRESHOLD);
+            let (rise, fall) = (threshold(on), threshold(off));
             // The last event before the session left each pixel's reference anywhere between its
             // thresholds.
             let reference = libm::exp(0.5 * (random.unit() * (rise + fall) - rise));
@@ -75,7 +79,7 @@ impl Pixels {
             blocks,
             pixels: all,
             refractory: Refractory::new(),
-            refractory_ns: i64::from(config.refractory_us) * NS_PER_US,
+            refractory_us: RefractoryTimes::new(scene, config),
             slack: vec![f32::NEG_INFINITY; WIDTH],
             margin: f32::NEG_INFINITY,
         }
@@ -140,7 +144,8 @@ impl Pixels {
             return false;
         }
         out.push(event);
-        self.refractory.set(x, y, event.t_ns + self.refractory_ns);
+        let refractory_ns = self.refractory_us.of(x, y) * NS_PER_US;
+        self.refractory.set(x, y, event.t_ns + refractory_ns);
         let v = usize::from(y);
         if self.rows.contains(&v) {
             self.hold(self.block(usize::from(x), v - self.rows.start));
@@ -273,7 +278,7 @@ impl Pixels {
     ) -> Option<i64> {
         let pixel = self.block(u, v);
         let (x, y) = (u as u16, (v + self.rows.start) as u16);
-        let refractory_us = self.refractory_ns / NS_PER_US;
+        let refractory_us = self.refractory_us.of(x, y);
         let mut last_us = None;
         loop {
             let (up, down) = self.bounds(pixel);
@@ -306,7 +311,7 @@ impl Pixels {
             }
             self.set_reference(pixel, at_us(light, from_us));
         }
-        last_us.map(|us| t_ns + us * NS_PER_US + self.refractory_ns)
+        last_us.map(|us| t_ns + (us + refractory_us) * NS_PER_US)
     }
 }
 

@@ -2,6 +2,11 @@
 
 use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
+use crate::random::{Purpose, Stream};
+use crate::scene::SceneConfig;
+
+use super::config::OpticalConfig;
+
 const WIDTH: usize = SENSOR_WIDTH as usize;
 
 /// Pixels that emitted an event a short time ago. Few at a time; noise may meet any of them.
@@ -51,5 +56,31 @@ impl Refractory {
         let (x, y, _) = self.pixels.swap_remove(k);
         let (word, mask) = Self::bit(x, y);
         self.members[word] &= !mask;
+    }
+}
+
+/// Length of the refractory time, µs: one for all pixels, or one each.
+#[derive(Debug, Clone)]
+pub(super) enum RefractoryTimes {
+    Equal(i64),
+    Each(Vec<u32>),
+}
+
+impl RefractoryTimes {
+    pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig) -> Self {
+        let Some(part) = config.parts.uneven_pixels else {
+            return Self::Equal(i64::from(config.refractory_us));
+        };
+        let mut random = Stream::new(scene.seed, Purpose::Pixels, 4);
+        let mut one = || part.refractory_least_us + part.refractory_mean_us * random.exponential();
+        let sensor = WIDTH * usize::from(SENSOR_HEIGHT);
+        Self::Each((0..sensor).map(|_| one().max(1.0) as u32).collect())
+    }
+
+    pub(super) fn of(&self, x: u16, y: u16) -> i64 {
+        match self {
+            Self::Equal(us) => *us,
+            Self::Each(all) => i64::from(all[usize::from(y) * WIDTH + usize::from(x)]),
+        }
     }
 }

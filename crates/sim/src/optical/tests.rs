@@ -12,6 +12,7 @@ use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 pub(super) fn scene(id: CameraId) -> SceneConfig {
     SceneConfig {
         seed: 11,
+        skin_seed: 11,
         start: 0,
         outline: SkinOutline::PAPER,
         camera_id: id,

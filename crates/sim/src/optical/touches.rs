@@ -13,6 +13,7 @@ use super::contact::{Contact, Relaxation};
 use super::dent::Dent;
 use super::light::Vec2;
 use super::optics::Optics;
+use super::variation::Variation;
 
 const WIDTH: usize = SENSOR_WIDTH as usize;
 
@@ -25,8 +26,9 @@ const CURVATURE: f64 = 1.106;
 /// One dent.
 #[derive(Debug, Clone)]
 struct Touch {
-    /// Position of first touch.
+    /// Position of the tip at first touch.
     place: Vec2,
+    variation: Variation,
     contact: Contact,
     dent: Dent,
     /// Depth at which each column was last evaluated, mm.
@@ -36,11 +38,13 @@ struct Touch {
 }
 
 impl Touch {
-    fn new(optics: &Optics, place: Vec2) -> Self {
-        let dent = Dent::new(optics, place);
+    fn new(optics: &Optics, place: Vec2, variation: Variation) -> Self {
+        let [dx, dy] = variation.offset_mm;
+        let dent = Dent::new(optics, [place[0] + dx, place[1] + dy]);
         let lost = |k: &f64| (CURVATURE * k) as f32;
         Self {
             place,
+            variation,
             contact: Contact::default(),
             lost_per_mm: dent.loss_per_mm.iter().map(lost).collect(),
             dent,
@@ -81,7 +85,7 @@ pub(super) struct Touches {
 impl Touches {
     pub(super) fn new(optics: &Optics, tips: usize) -> Self {
         let centre = optics.scene.outline.centre;
-        let touch = Touch::new(optics, [centre.x_mm, centre.y_mm]);
+        let touch = Touch::new(optics, [centre.x_mm, centre.y_mm], Variation::NONE);
         Self {
             all: vec![touch; tips],
             tips,
@@ -101,14 +105,18 @@ impl Touches {
             let depth_mm = tip.map_or(0.0, |at| depth_mm(optics, at));
             if let Some([x, y, _]) = tip
                 && depth_mm > 0.0
-                && self.all[k].is_elsewhere([x, y], optics.config.same_place_mm)
+                && self.needs_dent(optics, k, [x, y])
             {
                 self.place(optics, k, [x, y]);
                 moved = true;
             }
             let touch = &mut self.all[k];
             let unseen = touch.contact.is_unseen();
-            touch.contact.follow(depth_mm, self.relaxation);
+            let dented_mm = touch.variation.depth * depth_mm;
+            touch.contact.follow(
+                dented_mm.min(optics.scene.skin_thickness_mm),
+                self.relaxation,
+            );
             if unseen && !touch.contact.is_unseen() {
                 self.disturbed.push(touch.dent.columns.clone());
             }
@@ -124,16 +132,24 @@ impl Touches {
         }
     }
 
-    /// Tip `k` is on the skin at another place: a new touch, or the same one slides and takes its dent along.
+    /// Whether tip `k`, on the skin at `at`, makes or drags another dent than its last one.
+    fn needs_dent(&self, optics: &Optics, k: usize, at: Vec2) -> bool {
+        let touch = &self.all[k];
+        touch.is_elsewhere(at, optics.config.same_place_mm)
+            || (optics.config.parts.varies_presses() && !touch.contact.is_held())
+    }
+
+    /// Tip `k` is on the skin at another place, or again: a new touch, or the same one slides and takes its dent along.
     fn place(&mut self, optics: &Optics, k: usize, place: Vec2) {
-        let new = Touch::new(optics, place);
         if self.all[k].contact.is_held() {
+            let new = Touch::new(optics, place, self.all[k].variation);
             let touch = &mut self.all[k];
             self.disturbed
                 .extend([touch.dent.columns.clone(), new.dent.columns.clone()]);
             (touch.place, touch.dent) = (place, new.dent);
             return;
         }
+        let new = Touch::new(optics, place, Variation::draw(optics, place));
         let left = std::mem::replace(&mut self.all[k], new);
         if !left.contact.is_gone() {
             self.all.push(left);
