@@ -19,6 +19,7 @@ mod continuity;
 pub mod control;
 pub mod error;
 mod executor;
+mod feeling;
 pub mod guard;
 mod invalid_run;
 pub mod jog;

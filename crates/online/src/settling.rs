@@ -10,21 +10,10 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde::{Deserialize, Serialize};
-use skinrig_analysis::EventSource;
 use skinrig_analysis::result::Region;
-use skinrig_model::CameraId;
-
-use crate::detector::Felt;
-use crate::interleave::interleave;
-use crate::skin_model::SkinModel;
-use crate::stream::{Estimate, StreamSettings, TouchStream};
-use crate::threshold::ThresholdError;
-use crate::training::{MARGIN_US, Training};
 
 /// Probability that the last position stays within reach at every instant.
 const STAYS: f64 = 0.96;
-/// Host time between two positions of a calibration press, µs.
-const EVERY_US: i64 = 5_000;
 /// Steps per doubling of the events.
 const STEPS_PER_OCTAVE: f64 = 4.0;
 /// Quantile of the distances in a step that is typical there.
@@ -95,72 +84,7 @@ fn at_step(typical: &[f64], step: usize) -> f64 {
         .unwrap_or(f64::INFINITY)
 }
 
-/// A course under way.
-#[derive(Default)]
-struct Courses {
-    /// Onset, host µs, and course.
-    ended: Vec<(i64, Course)>,
-    open: Option<(i64, Course)>,
-}
-
-impl Courses {
-    fn add(&mut self, estimate: Estimate) {
-        match estimate {
-            Estimate::Felt(d) => {
-                self.ended.extend(self.open.take());
-                self.open = (d.felt == Felt::Onset).then(|| (d.host_us, Course::new()));
-            }
-            Estimate::Position { position, .. } => {
-                if let (Some((_, course)), Some(at)) = (&mut self.open, position.location) {
-                    course.push((position.clustered, at.at));
-                }
-            }
-        }
-    }
-}
-
 impl Settling {
-    /// Feels and locates the calibration presses as they will be later; `None` if they are too few for regions.
-    ///
-    /// # Errors
-    /// [`ThresholdError`] if the events cannot be read or the cameras have no common time.
-    pub(crate) fn measure(
-        skin: &SkinModel,
-        training: &Training,
-        source: &dyn EventSource,
-    ) -> Result<Option<Self>, ThresholdError> {
-        let settings = StreamSettings {
-            every_us: EVERY_US,
-            from_us: 0,
-        };
-        let mut stream = TouchStream::new(skin, settings)?;
-        let mut courses = Courses::default();
-        let end_us = (training.end_us() + 10.0 * MARGIN_US) as i64;
-        interleave(source, &training.clocks, |camera, events, next_us| {
-            let mut add = |estimate| courses.add(estimate);
-            for camera in CameraId::ALL {
-                let reached = Some(next_us[camera.index()]);
-                let promised = stream.push(camera, &[], reached, &mut add);
-                debug_assert!(promised.is_ok(), "no events, so none that are too many");
-            }
-            stream.push(camera, events, None, &mut add).is_ok()
-                && stream.detector().now_us() < end_us
-        })?;
-        stream.finish(|estimate| courses.add(estimate));
-        courses.ended.extend(courses.open);
-        let felt = courses.ended;
-        let of_press = |contact_us: f64, release_us: f64| {
-            let during = contact_us - MARGIN_US..release_us;
-            felt.iter()
-                .find(|(onset_us, _)| during.contains(&(*onset_us as f64)))
-        };
-        let presses = training.presses.iter();
-        let own: Vec<Course> = presses
-            .filter_map(|p| Some(of_press(p.contact_us, p.release_us)?.1.clone()))
-            .collect();
-        Ok(Self::learn(&own))
-    }
-
     /// From the positions of calibration presses; `None` if they are too few for this probability.
     pub(crate) fn learn(courses: &[Course]) -> Option<Self> {
         let presses: Vec<_> = courses.iter().map(distances).collect();

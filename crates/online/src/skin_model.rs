@@ -3,23 +3,19 @@
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::locator::{FittedLocator, LocatorModelError};
 use skinrig_analysis::result::{ClockFit, LocatorResult};
-use skinrig_analysis::{Analysis, EventSource};
 use skinrig_model::{AnalysisSettings, SkinOutline, StereoGeometry};
 
-use crate::learn::learn;
 use crate::model::TouchModel;
 use crate::position::PositionEstimator;
 use crate::settling::Settling;
-use crate::threshold::{IdleStatistic, ThresholdError};
-use crate::training::Training;
 
 /// What was learnt from the calibration presses of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SkinModel {
     pub(crate) settings: AnalysisSettings,
-    outline: SkinOutline,
-    geometry: StereoGeometry,
-    locator: Option<LocatorResult>,
+    pub(crate) outline: SkinOutline,
+    pub(crate) geometry: StereoGeometry,
+    pub(crate) locator: Option<LocatorResult>,
     /// Clock of each camera.
     pub(crate) clocks: [ClockFit; 2],
     pub(crate) touches: TouchModel,
@@ -28,41 +24,12 @@ pub struct SkinModel {
     /// How far positions still move; `None` if the presses are too few for regions.
     pub(crate) settling: Option<Settling>,
     /// Idle time behind the threshold, s.
-    idle_s: f64,
+    pub(crate) idle_s: f64,
     /// Middle of the presses behind the clock fits, host µs.
-    clocks_at_us: f64,
+    pub(crate) clocks_at_us: f64,
 }
 
 impl SkinModel {
-    /// Learns from the calibration presses of an analysis, whose events are `source`, for at most this many false alarms per second
-    /// (above 0).
-    ///
-    /// # Errors
-    /// [`ThresholdError`]: too few calibration presses or too little idle time, no common time, or unreadable events.
-    pub fn learn(
-        analysis: &Analysis,
-        source: &dyn EventSource,
-        false_alarms_per_s: f64,
-    ) -> Result<Self, ThresholdError> {
-        let training = Training::of(analysis)?;
-        let touches = learn(&training, source)?;
-        let idle = IdleStatistic::measure(&touches, &training, source, |_, _| true)?;
-        let mut skin = Self {
-            settings: analysis.settings.clone(),
-            outline: analysis.rig.outline,
-            geometry: analysis.geometry,
-            locator: analysis.locator.clone(),
-            clocks: *training.clocks(),
-            threshold: idle.threshold(false_alarms_per_s),
-            settling: None,
-            idle_s: idle.seconds(),
-            clocks_at_us: training.middle_us(),
-            touches,
-        };
-        skin.settling = Settling::measure(&skin, &training, source)?;
-        Ok(skin)
-    }
-
     pub(crate) fn positions(&self) -> Result<PositionEstimator, LocatorModelError> {
         let locator = FittedLocator::restored(self.locator.as_ref(), self.geometry)?;
         Ok(PositionEstimator::with(

@@ -61,7 +61,7 @@ pub struct CameraLeads {
 }
 
 /// The estimator. Its answers depend on the events alone, not on how they are cut or in which order the cameras deliver them.
-pub struct TouchStream {
+pub(crate) struct TouchStream {
     detector: Detector,
     positions: PositionEstimator,
     settling: Option<Settling>,
@@ -86,7 +86,7 @@ impl TouchStream {
     ///
     /// # Errors
     /// [`StreamError`]: see there.
-    pub fn new(skin: &SkinModel, settings: StreamSettings) -> Result<Self, StreamError> {
+    pub(crate) fn new(skin: &SkinModel, settings: StreamSettings) -> Result<Self, StreamError> {
         let StreamSettings { every_us, from_us } = settings;
         Ok(Self {
             detector: Detector::new(&skin.touches, &skin.clocks, skin.threshold, from_us)?,
@@ -106,7 +106,7 @@ impl TouchStream {
     ///
     /// # Errors
     /// [`CameraLeads`] if too many events wait for the other camera; the newest ones of this camera are dropped then.
-    pub fn push(
+    pub(crate) fn push(
         &mut self,
         camera: CameraId,
         events: &[CdEvent],
@@ -159,15 +159,14 @@ impl TouchStream {
     }
 
     /// Ends the streams.
-    pub fn finish(&mut self, each: impl FnMut(Estimate)) {
+    pub(crate) fn finish(&mut self, each: impl FnMut(Estimate)) {
         let decisions = &mut self.decisions;
         self.detector.finish(|d| decisions.push(d));
         self.report(each);
     }
 
     /// The detector.
-    #[must_use]
-    pub const fn detector(&self) -> &Detector {
+    pub(crate) const fn detector(&self) -> &Detector {
         &self.detector
     }
 

@@ -8,7 +8,8 @@ use skinrig_statistics::seeded;
 
 use crate::model::{Pattern, TouchModel};
 use crate::regions::{REGIONS, region};
-use crate::{Detection, Detector, Estimate, Felt, SkinModel, StreamSettings, TouchStream};
+use crate::stream::TouchStream;
+use crate::{Detection, Detector, Estimate, Felt, SkinModel, StreamSettings};
 
 const IDLE_PER_S: f64 = 5_000.0;
 const TOUCH_PER_S: f64 = 20_000.0;

@@ -1,75 +1,12 @@
 //! Touches felt while the run records: feeds the sense, records its answers, and lets a press react to them.
 
-use skinrig_model::{
-    CameraId, HostTime, PressFault, RawChunk, Reaction, Record, RunFault, TouchEstimate, TouchKind,
-};
-use skinrig_protocol::React;
+use skinrig_model::{CameraId, HostTime, PressFault, Reaction, Record, RunFault, TouchEstimate};
 use skinrig_protocol::plan::{PressStep, Step};
 
 use super::Executor;
 use crate::error::Halt;
 use crate::open_press::OpenPress;
-use crate::touch_sense::{Fed, SenseAnswer, SensedTouch, TouchSense};
-
-/// The sense, what it has of each stream, and the touch that it feels.
-pub(super) struct Feeling {
-    sense: Box<dyn TouchSense>,
-    fed: [Fed; 2],
-    /// Set once learning has begun: nobody needs the newest bytes before.
-    learning: bool,
-    touch: Option<FeltTouch>,
-    /// Touch for which the tip is about to be lifted.
-    lifting: Option<SensedTouch>,
-}
-
-/// The touch that is felt.
-#[derive(Clone, Copy)]
-struct FeltTouch {
-    /// Time of its onset.
-    onset: HostTime,
-    /// Its onset or newest position.
-    newest: SensedTouch,
-}
-
-impl Feeling {
-    pub(super) fn new(sense: Box<dyn TouchSense>) -> Self {
-        Self {
-            sense,
-            fed: [Fed::default(); 2],
-            learning: false,
-            touch: None,
-            lifting: None,
-        }
-    }
-
-    /// Feeds a complete chunk.
-    pub(super) fn complete(&mut self, chunk: &RawChunk) {
-        if self.sense.is_on() {
-            self.fed[chunk.camera.index()].complete(chunk, self.sense.as_mut());
-        }
-    }
-
-    fn felt(&mut self, touch: SensedTouch) {
-        self.touch = match (touch.kind, self.touch) {
-            (TouchKind::Onset, _) => Some(FeltTouch {
-                onset: touch.until,
-                newest: touch,
-            }),
-            (TouchKind::Position, Some(felt)) => Some(FeltTouch {
-                newest: touch,
-                ..felt
-            }),
-            _ => None,
-        };
-    }
-
-    /// The touch that fulfils `react`, if one is felt that began after `since`: an older one is none of this press.
-    fn fulfilled(&self, react: React, since: HostTime) -> Option<SensedTouch> {
-        let touch = self.touch.filter(|t| t.onset > since)?.newest;
-        let within = |most: f64| touch.region.is_some_and(|r| r.semi_axes_mm[0] <= most);
-        react.region_mm.is_none_or(within).then_some(touch)
-    }
-}
+use crate::touch_sense::{SenseAnswer, SensedTouch};
 
 impl Executor<'_> {
     /// Learning is due. A leg that starts in the middle of the plan has no such step.

@@ -25,6 +25,7 @@ use skinrig_protocol::plan::Plan;
 
 use crate::camera_streams::{CameraStreams, ReadMode};
 use crate::error::Halt;
+use crate::feeling::Feeling;
 use crate::guard::GuardedIndenter;
 use crate::journal::Journal;
 use crate::looks::Looks;
@@ -37,8 +38,6 @@ use crate::settings::ControllerSettings;
 use crate::states::Event;
 use crate::suspend::Suspender;
 use crate::trigger_line::TriggerLine;
-
-use feel::Feeling;
 
 /// The parts of a run. Dropping it before the end of the run brings the rig to rest.
 pub(crate) struct Executor<'a> {

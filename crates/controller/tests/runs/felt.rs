@@ -103,11 +103,11 @@ struct Felt {
 
 impl Felt {
     fn outcomes(&self) -> Vec<&PressOutcome> {
-        let outcome = |r| match r {
-            &Record::Outcome(ref outcome) => Some(outcome),
+        let outcomes = self.records.iter().filter_map(|r| match r {
+            Record::Outcome(outcome) => Some(outcome),
             _ => None,
-        };
-        self.records.iter().filter_map(outcome).collect()
+        });
+        outcomes.collect()
     }
 
     fn depths_mm(&self) -> Vec<f64> {

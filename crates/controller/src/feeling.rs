@@ -1,0 +1,66 @@
+//! The sense of a run: which bytes it has, and the touch that is felt.
+
+use skinrig_model::{HostTime, RawChunk, TouchKind};
+use skinrig_protocol::React;
+
+use crate::touch_sense::{Fed, SensedTouch, TouchSense};
+
+/// The sense, what it has of each stream, and the touch that it feels.
+pub(crate) struct Feeling {
+    pub(crate) sense: Box<dyn TouchSense>,
+    pub(crate) fed: [Fed; 2],
+    /// Set once learning has begun: nobody needs the newest bytes before.
+    pub(crate) learning: bool,
+    pub(crate) touch: Option<FeltTouch>,
+    /// Touch for which the tip is about to be lifted.
+    pub(crate) lifting: Option<SensedTouch>,
+}
+
+/// The touch that is felt.
+#[derive(Clone, Copy)]
+pub(crate) struct FeltTouch {
+    /// Time of its onset.
+    onset: HostTime,
+    /// Its onset or newest position.
+    newest: SensedTouch,
+}
+
+impl Feeling {
+    pub(crate) fn new(sense: Box<dyn TouchSense>) -> Self {
+        Self {
+            sense,
+            fed: [Fed::default(); 2],
+            learning: false,
+            touch: None,
+            lifting: None,
+        }
+    }
+
+    /// Feeds a complete chunk.
+    pub(crate) fn complete(&mut self, chunk: &RawChunk) {
+        if self.sense.is_on() {
+            self.fed[chunk.camera.index()].complete(chunk, self.sense.as_mut());
+        }
+    }
+
+    pub(crate) fn felt(&mut self, touch: SensedTouch) {
+        self.touch = match (touch.kind, self.touch) {
+            (TouchKind::Onset, _) => Some(FeltTouch {
+                onset: touch.until,
+                newest: touch,
+            }),
+            (TouchKind::Position, Some(felt)) => Some(FeltTouch {
+                newest: touch,
+                ..felt
+            }),
+            _ => None,
+        };
+    }
+
+    /// The touch that fulfils `react`, if one is felt that began after `since`: an older one is none of this press.
+    pub(crate) fn fulfilled(&self, react: React, since: HostTime) -> Option<SensedTouch> {
+        let touch = self.touch.filter(|t| t.onset > since)?.newest;
+        let within = |most: f64| touch.region.is_some_and(|r| r.semi_axes_mm[0] <= most);
+        react.region_mm.is_none_or(within).then_some(touch)
+    }
+}
