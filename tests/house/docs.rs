@@ -10,7 +10,7 @@ use std::fs::{read_dir, read_to_string};
 use std::path::{Path, PathBuf};
 
 /// Maximum number of words over all pages, as counted by `wc -w`.
-const WORDS: usize = 25_000;
+const WORDS: usize = 25_250;
 
 fn top() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
