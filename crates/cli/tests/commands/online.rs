@@ -86,6 +86,7 @@ fn presses_stop_when_they_are_felt_while_recording() {
     }
     let results = skinrig(&["--json", "analyze", &session]).code(0).out;
     let results: Value = serde_json::from_str(&results).unwrap();
+    let results = &results["analysis"];
     let felt = &results["felt"];
     assert_eq!(felt["presses"], 4, "{felt}");
     assert_eq!(felt["reactions"]["reaction"], "stop");

@@ -111,7 +111,7 @@ fn earlier_legs_cannot_be_rewritten() {
         ),
         ("UPDATE attempt SET leg = 2 WHERE press = 1 AND number = 1", "attempt"),
         ("UPDATE note SET text = 'tip not cleaned' WHERE id = 1", "note"),
-        ("UPDATE touch SET x_mm = 1 WHERE id = 2", "touch"),
+        ("UPDATE touch SET t_ns = t_ns + 1 WHERE id = 2", "touch"),
         (
             "UPDATE notification SET reason = NULL, cause = NULL WHERE id = 2",
             "notification",
