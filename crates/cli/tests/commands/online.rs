@@ -97,6 +97,29 @@ fn presses_stop_when_they_are_felt_while_recording() {
     let warnings = results["warnings"].to_string();
     assert!(warnings.contains("stopped_when_felt"), "{warnings}");
 
+    // Against a session whose presses went to their depth, the skin would be blamed.
+    let usual = text(&lab.record(
+        "usual",
+        &[
+            "--set",
+            "repetitions.count=4",
+            "--set",
+            "evaluation.calibrate=[1, 2, 3]",
+            "--set",
+            "evaluation.score=[4]",
+            "--set",
+            "analysis.calibration=positions",
+            "--seed",
+            "9",
+        ],
+    ));
+    skinrig(&["compare", &usual, &session])
+        .code(2)
+        .expect_stderr(&[
+            "presses that stopped when they were felt",
+            "--despite stopped",
+        ]);
+
     let folder = lab.path("again");
     skinrig(&[
         "run",

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use skinrig_analysis::result::AlignmentStatus;
+use skinrig_model::Reaction;
 
 use super::camera_checks::{ambient, cameras};
 use super::difference::{Difference, Severity, difference};
@@ -14,6 +15,7 @@ pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference
     found.extend(check_alignment(subjects));
     found.extend(check_results(subjects, locations));
     found.extend(check_depths(subjects, locations));
+    found.extend(check_stopped(subjects));
     found.extend(check_locations(subjects, locations));
     found.extend(check_duplicates(subjects));
     found.extend(check_seeds(subjects));
@@ -123,6 +125,32 @@ fn check_depths(subjects: &[Subject], locations: &Locations) -> Option<Differenc
         values,
         reason,
     ))
+}
+
+/// Presses that stopped when they were felt did not reach the depth that their rows state.
+fn check_stopped(subjects: &[Subject]) -> Option<Difference> {
+    let stopped = |s: &Session| {
+        let reactions = s.analysis.felt.as_ref()?.reactions.as_ref()?;
+        let depths = &reactions.depth_mm;
+        (reactions.reaction == Reaction::Stop).then_some((depths.n, depths.median?))
+    };
+    let sessions = || subjects.iter().flat_map(|s| &s.sessions);
+    let (stops, all) = (sessions().filter_map(stopped).count(), sessions().count());
+    if stops == 0 {
+        return None;
+    }
+    let values = each(subjects, |s| match stopped(s) {
+        Some((presses, mm)) => format!("{presses} stopped, at {mm:.2} mm in the median"),
+        None => "none stopped".to_owned(),
+    });
+    let what = "presses that stopped when they were felt";
+    let reason = "they did not reach the planned depth: each is as deep as it took to feel it";
+    let found = difference("stopped", what, Severity::Confounding, values, reason);
+    Some(if stops == all {
+        found
+    } else {
+        as_blocking(found, "press both skins with the same `online.react`")
+    })
 }
 
 fn check_locations(subjects: &[Subject], locations: &Locations) -> Option<Difference> {

@@ -127,6 +127,12 @@ pub const RULES: &[Rule] = &[
         "another outline rejects other estimates",
     ),
     rule(
+        "protocol.online.react",
+        "react",
+        Confounding,
+        "presses that react to being felt hold shorter, or are less deep",
+    ),
+    rule(
         "protocol.",
         "protocol",
         Harmless,
