@@ -109,6 +109,13 @@ pub(crate) fn reproduce(args: &ReproduceArgs, json: bool) -> Outcome {
             format!("{} files", report.files.len()),
         ));
     }
+    for bundle in unnamed(folder, &headline)? {
+        add(Check::fail(
+            bundle,
+            "numbers of this session, too",
+            "none in the list of numbers",
+        ));
+    }
     let selected = selected(folder, &headline, &mut add);
     for session in &headline.sessions {
         let presses = selected
@@ -164,8 +171,26 @@ fn headline(folder: &Path) -> Result<Headline, Failure> {
         None if version != FORMAT || !is_file => {
             Err(not(format!("{} of version {}", version.0, version.1)))
         }
+        None if found.sessions.iter().all(|s| s.numbers.is_empty()) => {
+            Err(not("no number".to_owned()))
+        }
         None => Ok(found),
     }
+}
+
+/// Bundles in the crate of which it states no number.
+fn unnamed(folder: &Path, headline: &Headline) -> Result<Vec<String>, Failure> {
+    let mut found = Vec::new();
+    for file in std::fs::read_dir(folder).map_err(Failure::internal)? {
+        let name = file.map_err(Failure::internal)?.file_name();
+        let name = name.to_string_lossy().into_owned();
+        let mut named = headline.sessions.iter().filter(|s| !s.numbers.is_empty());
+        if name.ends_with(".bundle") && !named.any(|s| s.bundle == name) {
+            found.push(name);
+        }
+    }
+    found.sort();
+    Ok(found)
 }
 
 /// True for the name of something directly in the folder.

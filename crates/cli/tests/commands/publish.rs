@@ -124,7 +124,21 @@ fn a_published_selection_is_derived_again_elsewhere_and_any_edit_fails() {
             .contains(&format!("scored rmse: expected {other}")),
         "{failed:#?}"
     );
-    std::fs::write(folder.join("headline.json"), stored).unwrap();
+    std::fs::write(folder.join("headline.json"), &stored).unwrap();
+    std::fs::write(folder.join("ro-crate-metadata.json"), &metadata).unwrap();
+
+    // A crate that states nothing has nothing that could fail.
+    let (head, _) = stored.split_once("\"sessions\": [").unwrap();
+    forge(
+        &folder,
+        "headline.json",
+        &stored,
+        &format!("{head}\"sessions\": []}}"),
+    );
+    reproduce(&folder)
+        .code(2)
+        .expect_stderr(&["found no number"]);
+    std::fs::write(folder.join("headline.json"), &stored).unwrap();
     std::fs::write(folder.join("ro-crate-metadata.json"), &metadata).unwrap();
 
     // The reason of an exclusion reworded, and a table edited, with descriptions that fit.
