@@ -116,8 +116,10 @@ pub fn felt(
     let (presses, before): (Vec<ScoredPress>, Vec<ScoredPress>) =
         all.into_iter().partition(|p| p.contact_us > us(from));
     let score = DetectionScore::new(&detections(touches), &presses);
+    let was_felt = |p: &&ScoredPress| score.delays_ms.iter().any(|(row, _)| *row == p.row);
     let sensed: Vec<Sensed<'_>> = presses
         .iter()
+        .filter(was_felt)
         .filter_map(|p| Sensed::of(analysis, p, touches))
         .collect();
     let held: Vec<bool> = sensed

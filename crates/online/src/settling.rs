@@ -1,10 +1,10 @@
 //! Regions that hold at every instant of a touch: how far positions still move until it ends, learnt from calibration presses.
 //!
 //! At an instant, the position that the touch will end with lies within `reach` of the position so far, with probability
-//! [`STAYS`], at all instants together: `reach` is a multiple of a typical distance after so many clustered events in the weaker
-//! camera, and the multiple is the conformal quantile, over presses, of the largest ratio that a press has at any instant (Vovk,
+//! [`STAYS`], at all instants together: `reach` is a multiple of the largest distance seen after so many clustered events in the
+//! weaker camera, and the multiple is the conformal quantile, over presses, of the largest ratio that a press has at any instant (Vovk,
 //! Gammerman & Shafer, "Algorithmic Learning in a Random World", 2005, chapter 2; each half of the presses is scored with the
-//! typical distances of the other). Events, not time, tell how far a touch has come: a press that stops early stays uncertain. The
+//! largest distances of the other). Events, not time, tell how far a touch has come: a press that stops early stays uncertain. The
 //! last position lies with probability 0.99 in the 99 % region of its locator. Both together hold with 95 %, whenever one stops.
 
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -16,9 +16,7 @@ use skinrig_analysis::result::Region;
 const STAYS: f64 = 0.96;
 /// Steps per doubling of the events.
 const STEPS_PER_OCTAVE: f64 = 4.0;
-/// Quantile of the distances in a step that is typical there.
-const TYPICAL: f64 = 1.0;
-/// Smallest typical distance, mm: below what any skin resolves.
+/// Smallest of these distances, mm: below what any skin resolves.
 const LEAST_MM: f64 = 0.02;
 
 /// Positions of one calibration press: clustered events in the weaker camera, and position, mm; in order of time.
@@ -27,12 +25,10 @@ pub(crate) type Course = Vec<(u32, [f64; 2])>;
 /// How far positions still move.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Settling {
-    /// Typical distance to the last position by step of events, mm; falls with them.
-    typical_mm: Vec<f64>,
+    /// Largest distance to the last position by step of events, mm; falls with them.
+    largest_mm: Vec<f64>,
     /// Multiple of it that holds at all instants.
     multiple: f64,
-    /// Presses behind it, for display.
-    presses: usize,
 }
 
 fn step(events: u32) -> usize {
@@ -51,35 +47,26 @@ fn distances(course: &Course) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// Typical distances of these presses; none without presses.
-fn typical(presses: &[&Vec<(usize, f64)>]) -> Vec<f64> {
+/// Largest distance of these presses in each step; none without presses.
+fn largest(presses: &[&Vec<(usize, f64)>]) -> Vec<f64> {
     let steps = presses.iter().flat_map(|p| p.iter()).map(|(s, _)| s + 1);
-    let mut typical: Vec<f64> = Vec::new();
+    let mut largest: Vec<f64> = Vec::new();
     for at in 0..steps.max().unwrap_or(0) {
-        // The largest distance of each press, so that one that stays long in a step counts once.
-        let largest = |press: &&Vec<(usize, f64)>| {
-            let here = press.iter().filter(|(s, _)| *s == at).map(|(_, d)| *d);
-            here.fold(None, |most: Option<f64>, d| {
-                Some(most.map_or(d, |m| m.max(d)))
-            })
-        };
-        let mut here: Vec<f64> = presses.iter().filter_map(largest).collect();
-        here.sort_by(f64::total_cmp);
-        let rank = (TYPICAL * here.len() as f64) as usize;
-        let value = here.get(rank.min(here.len().saturating_sub(1)));
-        typical.push(value.copied().unwrap_or(0.0).max(LEAST_MM));
+        let here = presses.iter().flat_map(|p| p.iter());
+        let here = here.filter(|(step, _)| *step == at).map(|(_, d)| *d);
+        largest.push(here.fold(LEAST_MM, f64::max));
     }
     // More events are no less certain; a step that was not seen counts as the one with more.
-    for at in (1..typical.len()).rev() {
-        typical[at - 1] = typical[at - 1].max(typical[at]);
+    for at in (1..largest.len()).rev() {
+        largest[at - 1] = largest[at - 1].max(largest[at]);
     }
-    typical
+    largest
 }
 
-fn at_step(typical: &[f64], step: usize) -> f64 {
-    typical
+fn at_step(largest: &[f64], step: usize) -> f64 {
+    largest
         .get(step)
-        .or(typical.last())
+        .or(largest.last())
         .copied()
         .unwrap_or(f64::INFINITY)
 }
@@ -94,7 +81,7 @@ impl Settling {
         };
         let mut ratios = Vec::new();
         for odd in [0, 1] {
-            let of_others = typical(&half(1 - odd));
+            let of_others = largest(&half(1 - odd));
             for press in half(odd) {
                 let ratio = |(step, distance): &(usize, f64)| distance / at_step(&of_others, *step);
                 ratios.push(press.iter().map(ratio).fold(0.0, f64::max));
@@ -104,14 +91,13 @@ impl Settling {
         let rank = ((presses.len() as f64 + 1.0) * STAYS).ceil() as usize;
         Some(Self {
             multiple: *ratios.get(rank.checked_sub(1)?)?,
-            typical_mm: typical(&presses.iter().collect::<Vec<_>>()),
-            presses: presses.len(),
+            largest_mm: largest(&presses.iter().collect::<Vec<_>>()),
         })
     }
 
     /// Distance from the position after so many events within which the last one of the touch lies, mm.
     fn reach_mm(&self, events: u32) -> f64 {
-        self.multiple * at_step(&self.typical_mm, step(events))
+        self.multiple * at_step(&self.largest_mm, step(events))
     }
 
     /// The region of a position after so many events: an ellipse that holds every point within reach of the region of the last position.
@@ -205,7 +191,7 @@ mod tests {
         ) {
             let (a, b) = if a > b { (a, b) } else { (b, a) };
             let last = Region { semi_axes_mm: [a, b], angle_deg };
-            let settling = Settling { typical_mm: vec![reach], multiple: 1.0, presses: 99 };
+            let settling = Settling { largest_mm: vec![reach], multiple: 1.0 };
             let region = settling.region(last, 0).unwrap();
             let (sin, cos) = libm::sincos(f64::to_radians(angle_deg));
             let (y, x): (f64, f64) = libm::sincos(at);
