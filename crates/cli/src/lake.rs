@@ -93,11 +93,7 @@ fn add(lake: &Lake, path: &Path) -> Result<Added, Failure> {
     };
     let commit = LakeCommit {
         session_id: reader.session_id().map_err(Failure::session)?,
-        content_sha256: seal
-            .tree_sha256
-            .iter()
-            .map(|b| format!("{b:02x}"))
-            .collect(),
+        content_sha256: seal.content_sha256(),
         partition: partition(path, &header)?,
     };
     if lake.has(&commit).map_err(export::refused)? {

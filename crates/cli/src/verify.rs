@@ -149,8 +149,7 @@ pub(crate) fn check_bundle(
         let stem = stem.file_name().unwrap_or_default().to_string_lossy();
         let copy = scratch.path().join(format!("{stem}{SESSION_SUFFIX}"));
         checked.analysis = analyses::stored(&copy, &id, None);
-        let hex = |hash: [u8; 32]| hash.iter().map(|b| format!("{b:02x}")).collect();
-        checked.content_sha256 = seal.map_or_else(String::new, |s| hex(s.tree_sha256));
+        checked.content_sha256 = seal.map_or_else(String::new, |s| s.content_sha256());
     }
     report.problems.extend(wrong);
     checked.report = report;

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Read, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -82,16 +82,23 @@ pub fn seal_bundle(
         files: entries.collect::<Result<_, _>>()?,
     };
     let path = folder.join(MANIFEST);
-    let partial = folder.join(format!("{MANIFEST}.partial"));
-    let text = serde_json::to_string_pretty(&manifest).map_err(ExportError::file(&path))?;
+    write_document(&path, &manifest)
+}
+
+/// Writes a JSON document; the file is there whole, and on the disk, or not at all.
+pub(crate) fn write_document(path: &Path, document: &impl Serialize) -> Result<(), ExportError> {
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
+    let text = serde_json::to_string_pretty(document).map_err(ExportError::file(path))?;
     let _ = std::fs::remove_file(&partial);
     File::create_new(&partial)
         .and_then(|mut file| {
             file.write_all(text.as_bytes())?;
             file.sync_all()
         })
-        .and_then(|()| std::fs::rename(&partial, &path))
-        .map_err(ExportError::file(&path))
+        .and_then(|()| std::fs::rename(&partial, path))
+        .map_err(ExportError::file(path))
 }
 
 /// Entry of a file in its present state.

@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::io::{Read as _, Write as _};
+use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 
 use serde_json::{Value, json};
 use skinrig_recorder::Problem;
 
-use crate::bundle::{Entry, SIGNATURE_ENDING, entry};
+use crate::bundle::{Entry, SIGNATURE_ENDING, entry, write_document};
 use crate::error::ExportError;
 
 /// The file that describes the others.
@@ -100,16 +100,7 @@ pub fn seal_crate(folder: &Path, about: &CrateDescription) -> Result<(), ExportE
         "@graph": graph(about, &files?),
     });
     let path = folder.join(METADATA);
-    let text = serde_json::to_string_pretty(&document).map_err(ExportError::file(&path))?;
-    let partial = folder.join(format!("{METADATA}.partial"));
-    let _ = std::fs::remove_file(&partial);
-    File::create_new(&partial)
-        .and_then(|mut file| {
-            file.write_all(text.as_bytes())?;
-            file.sync_all()
-        })
-        .and_then(|()| std::fs::rename(&partial, &path))
-        .map_err(ExportError::file(&path))
+    write_document(&path, &document)
 }
 
 /// Everything that the description states, as JSON-LD entities.

@@ -8,6 +8,8 @@ use skinrig_model::{
 
 use skinrig_formats::codec::Codec;
 
+use crate::hex::hex;
+
 /// Identity of a session: its header without the texts of protocol, plan and rig.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Headline {
@@ -210,4 +212,12 @@ pub struct Seal {
     pub tree_sha256: [u8; 32],
     /// SHA-256 of the file, with these 32 bytes as zero.
     pub file_sha256: [u8; 32],
+}
+
+impl Seal {
+    /// SHA-256 of the content in lower-case hex, which identifies what was recorded.
+    #[must_use]
+    pub fn content_sha256(&self) -> String {
+        hex(&self.tree_sha256)
+    }
 }

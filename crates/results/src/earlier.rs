@@ -36,7 +36,7 @@ pub(crate) fn calibration(
     let seal = earlier.reader.seal()?;
     let about = EarlierSession {
         session_id: earlier.reader.session_id()?,
-        content_sha256: seal.map(|s| s.tree_sha256.iter().map(|b| format!("{b:02x}")).collect()),
+        content_sha256: seal.map(|s| s.content_sha256()),
         started: earlier.header.started_at.clone(),
     };
     let aligned = earlier.read_input()?.align();

@@ -242,9 +242,7 @@ fn one_session(
 /// Hash of the seal; empty without one.
 fn content(reader: &SessionReader) -> Result<String, RecorderError> {
     let seal = reader.seal()?;
-    Ok(seal.map_or_else(String::new, |s| {
-        s.tree_sha256.iter().map(|b| format!("{b:02x}")).collect()
-    }))
+    Ok(seal.map_or_else(String::new, |s| s.content_sha256()))
 }
 
 /// The official analysis that was written beside the copy of a session.

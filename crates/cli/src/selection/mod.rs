@@ -168,7 +168,7 @@ fn facts(path: &Path) -> Result<SessionFacts, RecorderError> {
     let presses = reader.presses()?;
     Ok(SessionFacts {
         path: path.to_owned(),
-        content_sha256: seal.map(|s| s.tree_sha256.iter().map(|b| format!("{b:02x}")).collect()),
+        content_sha256: seal.map(|s| s.content_sha256()),
         roles: presses.iter().map(|(press, _)| press.role).collect(),
     })
 }
