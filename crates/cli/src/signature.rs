@@ -117,7 +117,7 @@ impl std::fmt::Display for Signature {
             Some(signer) => write!(f, "signed by {signer}: {}", self.says),
             None => write!(
                 f,
-                "signed by anybody: {}; --signers FILE compares the key",
+                "signed with a key that was not checked: {}; --signers FILE checks it",
                 self.says
             ),
         }

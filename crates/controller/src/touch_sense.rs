@@ -42,7 +42,7 @@ pub enum SenseAnswer {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SenseFault {
     /// The presses teach too little, or cannot be analysed.
-    #[error("what a touch is could not be learnt: {0}")]
+    #[error("learning from the calibration presses failed: {0}")]
     NotLearnt(String),
     /// The estimator failed.
     #[error("the estimator failed: {0}")]
@@ -148,12 +148,12 @@ mod tests {
     use super::*;
 
     #[derive(Default)]
-    struct Fed2 {
+    struct CollectingSense {
         bytes: Vec<u8>,
         lost: Vec<(usize, u64)>,
     }
 
-    impl TouchSense for Fed2 {
+    impl TouchSense for CollectingSense {
         fn learn(&mut self) {}
 
         fn feed(&mut self, _: CameraId, lost: u64, bytes: &[u8]) {
@@ -194,7 +194,7 @@ mod tests {
                 let bytes = (0..4 * words).map(|_| { value = value.wrapping_add(1); value }).collect();
                 chunks.push(chunk(seq, lost, bytes));
             }
-            let (mut fed, mut sense) = (Fed::default(), Fed2::default());
+            let (mut fed, mut sense) = (Fed::default(), CollectingSense::default());
             let mut looks = looks.into_iter();
             for k in 0..chunks.len() {
                 for _ in 0..3 {

@@ -12,7 +12,7 @@ impl Executor<'_> {
     /// Learning is due. A leg that starts in the middle of the plan has no such step.
     pub(super) fn begin_learning(&mut self) -> Result<(), RunFault> {
         if !self.feeling.sense.is_on() {
-            let text = "touches are not felt: nothing feels them in a resumed or library run";
+            let text = "touches are not felt: only a run from the first press on can learn to";
             return self.journal.note(self.now(), text.to_owned());
         }
         self.feeling.learning = true;
@@ -26,8 +26,7 @@ impl Executor<'_> {
         if self.plan.online.is_none() || steps.any(|step| matches!(step, Step::Learn)) {
             return Ok(());
         }
-        let text =
-            "touches are not felt in this leg: it does not repeat the presses that teach them";
+        let text = "touches are not felt in this leg: it does not repeat the presses that it would learn from";
         self.journal.note(self.now(), text.to_owned())
     }
 

@@ -234,8 +234,9 @@ fn without_a_sense_presses_go_on_as_planned_and_the_session_says_why() {
     let felt = run(Reaction::Stop, None, Feels::Fails, None);
     assert!(felt.depths_mm().iter().all(|mm| (mm - 2.0).abs() < 0.1));
     assert!(
-        felt.notes()
-            .contains("touches are not felt: what a touch is could not be learnt: too few presses"),
+        felt.notes().contains(
+            "touches are not felt: learning from the calibration presses failed: too few presses"
+        ),
         "{}",
         felt.notes()
     );
