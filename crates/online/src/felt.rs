@@ -104,17 +104,20 @@ impl<'a> Sensed<'a> {
 }
 
 /// Compares `touches`, in the order of the record, with the analysis of the session, of which `depth_mm` gives the measured depths;
-/// `None` if nothing was ever felt in it.
+/// `None` if nothing was ever felt in it. Nothing is felt from `resumed` on, the start of the second leg.
 #[must_use]
 pub fn felt(
     analysis: &Analysis,
     touches: &[TouchEstimate],
+    resumed: Option<HostTime>,
     depth_mm: impl Fn(PressId) -> Option<f64>,
 ) -> Option<FeltTouches> {
     let from = touches.iter().find(|t| t.kind == TouchKind::Started)?.t;
     let all = ScoredPress::carried_out(analysis);
-    let (presses, before): (Vec<ScoredPress>, Vec<ScoredPress>) =
-        all.into_iter().partition(|p| p.contact_us > us(from));
+    let until_us = resumed.map_or(f64::INFINITY, us);
+    let (presses, outside): (Vec<ScoredPress>, Vec<ScoredPress>) = all
+        .into_iter()
+        .partition(|p| us(from) < p.contact_us && p.contact_us < until_us);
     let score = DetectionScore::new(&detections(touches), &presses);
     let was_felt = |p: &&ScoredPress| score.delays_ms.iter().any(|(row, _)| *row == p.row);
     let sensed: Vec<Sensed<'_>> = presses
@@ -137,7 +140,7 @@ pub fn felt(
     Some(FeltTouches {
         from_s: from.0 as f64 * 1e-9,
         presses: presses.len() as u32,
-        before: before.len() as u32,
+        outside: outside.len() as u32,
         felt: score.delays_ms.len() as u32,
         missed: score.missed as u32,
         alarmed: score.alarmed as u32,

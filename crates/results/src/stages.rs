@@ -102,7 +102,10 @@ impl AlignedSession {
         let depths: BTreeMap<PressId, f64> = rows
             .filter_map(|(press, outcome)| Some((press.id, outcome.as_ref()?.measured_depth_mm?)))
             .collect();
-        let felt = skinrig_online::felt(&analysis, &touches, |press| depths.get(&press).copied());
+        let resumed = self.input.legs.first().map(|leg| leg.origin);
+        let felt = skinrig_online::felt(&analysis, &touches, resumed, |press| {
+            depths.get(&press).copied()
+        });
         let end = self.session.reader.end()?.map(|(_, end)| end);
         let plan_json = &self.session.header.plan_json;
         let campaign = campaign::looks(&analysis, plan_json, end.as_ref())?;

@@ -19,10 +19,10 @@ pub struct Spread {
 pub struct FeltTouches {
     /// Time from which touches were felt, s of the session.
     pub from_s: f64,
-    /// Scored presses from then on that were carried out and follow another one, excluded or not.
+    /// Scored presses of the first leg from then on that were carried out and follow another one, excluded or not.
     pub presses: u32,
-    /// Those before it.
-    pub before: u32,
+    /// Those before it, or in further legs, in which nothing is felt.
+    pub outside: u32,
     /// Presses that were felt.
     pub felt: u32,
     /// Presses that were not.

@@ -1,30 +1,32 @@
-//! `skinrig online`: what a replay prints, and sessions that it cannot learn from.
+//! `skinrig online`, and touch felt while recording: what a replay prints, how presses react, sessions without enough to learn from.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use skinrig_model::{TouchEstimate, TouchKind};
 use skinrig_recorder::SessionReader;
 
-use crate::support::{Lab, only, skinrig, text};
+use crate::support::{Lab, SMALL, only, skinrig, text};
 
 /// Three repetitions calibrate, one scores.
 fn session(lab: &Lab) -> String {
     session_with(lab, &[])
 }
 
+/// Its settings.
+const USUAL: [&str; 10] = [
+    "--set",
+    "repetitions.count=4",
+    "--set",
+    "evaluation.calibrate=[1, 2, 3]",
+    "--set",
+    "evaluation.score=[4]",
+    "--set",
+    "analysis.calibration=positions",
+    "--set",
+    "analysis.bootstrap_resamples=50",
+];
+
 fn session_with(lab: &Lab, more: &[&str]) -> String {
-    let usual = [
-        "--set",
-        "repetitions.count=4",
-        "--set",
-        "evaluation.calibrate=[1, 2, 3]",
-        "--set",
-        "evaluation.score=[4]",
-        "--set",
-        "analysis.calibration=positions",
-        "--set",
-        "analysis.bootstrap_resamples=50",
-    ];
-    text(&lab.record("s", &[&usual, more].concat()))
+    text(&lab.record("s", &[&USUAL, more].concat()))
 }
 
 #[test]
@@ -98,21 +100,7 @@ fn presses_stop_when_they_are_felt_while_recording() {
     assert!(warnings.contains("stopped_when_felt"), "{warnings}");
 
     // Against a session whose presses went to their depth, the skin would be blamed.
-    let usual = text(&lab.record(
-        "usual",
-        &[
-            "--set",
-            "repetitions.count=4",
-            "--set",
-            "evaluation.calibrate=[1, 2, 3]",
-            "--set",
-            "evaluation.score=[4]",
-            "--set",
-            "analysis.calibration=positions",
-            "--seed",
-            "9",
-        ],
-    ));
+    let usual = text(&lab.record("usual", &[&USUAL[..], &["--seed", "9"]].concat()));
     skinrig(&["compare", &usual, &session])
         .code(2)
         .expect_stderr(&[
@@ -144,6 +132,31 @@ fn presses_stop_when_they_are_felt_while_recording() {
             .collect()
     };
     assert!(estimates(&again.touches().unwrap()) == estimates(&touches));
+}
+
+/// The leg that resumes a session does not feel: its presses are not missed.
+#[test]
+fn presses_after_a_resume_are_not_missed() {
+    let lab = Lab::new();
+    let folder = lab.text("s");
+    let mut run = vec!["run", SMALL, "--sessions", &folder, "--no-analysis"];
+    run.extend(USUAL);
+    run.extend([
+        "--set",
+        "online.false_alarms=0.1 Hz",
+        "--fault",
+        "camera1-unplugged@hold:16",
+    ]);
+    skinrig(&run).code(3);
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    skinrig(&["resume", &session, "--no-analysis"]).code(0);
+    let felt = &skinrig(&["--json", "analyze", &session]).code(0).json()["analysis"]["felt"];
+    assert_eq!(
+        (&felt["presses"], &felt["outside"]),
+        (&json!(1), &json!(3)),
+        "{felt}"
+    );
+    assert_eq!(felt["missed"], 0, "{felt}");
 }
 
 #[test]

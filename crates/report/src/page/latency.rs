@@ -127,10 +127,10 @@ fn felt_notes(f: &FeltTouches) -> Vec<String> {
         f.false_alarms,
         number(Some(f.at_risk_s), 0)
     )];
-    if f.before > 0 {
+    if f.outside > 0 {
         notes.push(format!(
-            "{} scored presses came before touches were felt, {} s into the session.",
-            f.before,
+            "{} scored presses came before touches were felt, {} s into the session, or after it was resumed.",
+            f.outside,
             number(Some(f.from_s), 0)
         ));
     }
