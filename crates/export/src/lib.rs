@@ -37,7 +37,7 @@ pub use npz::NpzFile;
 pub use parquet_files::ParquetFiles;
 pub use rocrate::{
     CrateDescription, CrateNumber, CrateOrganisation, CratePerson, CrateReport, METADATA,
-    seal_crate, verify_crate,
+    compare_description, is_signature, seal_crate, verify_crate,
 };
 pub use source::{Source, TableName};
 pub use table::TableWriter;

@@ -90,17 +90,64 @@ pub struct CrateReport {
 /// # Errors
 /// When a file cannot be read, or the description cannot be written.
 pub fn seal_crate(folder: &Path, about: &CrateDescription) -> Result<(), ExportError> {
+    write_document(&folder.join(METADATA), &description(folder, about)?)
+}
+
+/// The description of the files in `folder`, and of what `about` states.
+fn description(folder: &Path, about: &CrateDescription) -> Result<Value, ExportError> {
     let files: Result<Vec<Entry>, _> = files_in(folder)?
         .iter()
+        .filter(|name| !is_signature(name))
         .map(|name| entry(folder, name))
         .collect();
-    let document = json!({
+    Ok(json!({
         // The context of 1.1 is older than the property.
         "@context": [format!("{SPECIFICATION}/context"), { "sha256": "https://schema.org/sha256" }],
         "@graph": graph(about, &files?),
+    }))
+}
+
+/// Compares the description of `folder` with one that states `about`, entity by entity.
+///
+/// # Errors
+/// As [`verify_crate`], and when a file cannot be read.
+pub fn compare_description(
+    folder: &Path,
+    about: &CrateDescription,
+) -> Result<Vec<Problem>, ExportError> {
+    let (expected, found) = (description(folder, about)?, read_description(folder)?);
+    let place = |what: &str| format!("{METADATA}: {what}");
+    let entities = |document: &Value| -> Vec<Value> {
+        let graph = document["@graph"].as_array();
+        graph.cloned().unwrap_or_default()
+    };
+    let (mut missing, mut more) = (entities(&expected), entities(&found));
+    missing.retain(|entity| {
+        let same = more.iter().position(|other| other == entity);
+        same.map(|at| more.swap_remove(at)).is_none()
     });
-    let path = folder.join(METADATA);
-    write_document(&path, &document)
+    let mut problems = Vec::new();
+    for entity in &missing {
+        let id = entity["@id"].as_str().unwrap_or_default();
+        let at = more.iter().position(|other| other["@id"] == entity["@id"]);
+        let found = at.map(|at| more.swap_remove(at));
+        let found = found.map_or_else(|| "none".to_owned(), |other| other.to_string());
+        problems.push(Problem::new(place(id), entity, found));
+    }
+    for entity in &more {
+        let id = entity["@id"].as_str().unwrap_or_default();
+        problems.push(Problem::new(place(id), "no such entity", entity));
+    }
+    let others = |document: &Value| -> Value {
+        let mut document = document.clone();
+        document["@graph"].take();
+        document
+    };
+    let (expected, found) = (others(&expected), others(&found));
+    if expected != found {
+        problems.push(Problem::new(place("beside its entities"), expected, found));
+    }
+    Ok(problems)
 }
 
 /// Everything that the description states, as JSON-LD entities.
@@ -212,11 +259,8 @@ fn media_type(name: &str) -> &'static str {
     }
 }
 
-/// Compares every file in `folder` with its description.
-///
-/// # Errors
-/// [`ExportError::NotACrate`] for a folder without a description of this kind; [`ExportError::File`] when it cannot be read.
-pub fn verify_crate(folder: &Path) -> Result<CrateReport, ExportError> {
+/// Reads the description of a folder.
+fn read_description(folder: &Path) -> Result<Value, ExportError> {
     let path = folder.join(METADATA);
     let not = |found: String| ExportError::NotACrate {
         path: path.clone(),
@@ -230,7 +274,26 @@ pub fn verify_crate(folder: &Path) -> Result<CrateReport, ExportError> {
     file.take(MAX_METADATA_BYTES)
         .read_to_string(&mut text)
         .map_err(ExportError::file(&path))?;
-    let document: Value = serde_json::from_str(&text).map_err(|e| not(e.to_string()))?;
+    serde_json::from_str(&text).map_err(|e| not(e.to_string()))
+}
+
+/// True for the signature of the description.
+#[must_use]
+pub fn is_signature(name: &str) -> bool {
+    name.strip_suffix(SIGNATURE_ENDING) == Some(METADATA)
+}
+
+/// Compares every file in `folder` with its description.
+///
+/// # Errors
+/// [`ExportError::NotACrate`] for a folder without a description of this kind; [`ExportError::File`] when it cannot be read.
+pub fn verify_crate(folder: &Path) -> Result<CrateReport, ExportError> {
+    let document = read_description(folder)?;
+    let path = folder.join(METADATA);
+    let not = |found: String| ExportError::NotACrate {
+        path: path.clone(),
+        found,
+    };
     let graph = document["@graph"].as_array().map_or(&[][..], Vec::as_slice);
     let entity = |id: &str| graph.iter().find(|e| e["@id"] == id);
     let root = entity("./").ok_or_else(|| not("no description of the folder".to_owned()))?;
@@ -271,7 +334,7 @@ pub fn verify_crate(folder: &Path) -> Result<CrateReport, ExportError> {
         }
     }
     let others = present.iter().filter(|name| !described.contains_key(*name));
-    let others = others.filter(|name| name.strip_suffix(SIGNATURE_ENDING) != Some(METADATA));
+    let others = others.filter(|name| !is_signature(name));
     problems.extend(
         others
             .map(|name| Problem::new(name, "only files that the crate describes", "another file")),

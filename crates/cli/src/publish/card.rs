@@ -13,6 +13,8 @@ pub(super) struct Published {
     /// Folder of its bundle.
     pub bundle: String,
     pub provenance: Provenance,
+    /// The protocol as it was run.
+    pub protocol_text: String,
     /// With the selection, if there is one.
     pub analysis: Analysis,
 }

@@ -1,6 +1,8 @@
 //! `skinrig publish`: an RO-Crate of sessions or a selection, from which every number can be derived again.
 
 mod card;
+mod checks;
+mod documents;
 mod headline;
 mod reproduce;
 
@@ -8,14 +10,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::Analysis;
-use skinrig_export::{
-    CrateDescription, CrateNumber, CrateOrganisation, CratePerson, Folder, METADATA, seal_crate,
-};
-use skinrig_protocol::publication::{Organisation, Person};
+use skinrig_analysis::result::Estimate;
+use skinrig_export::{Folder, METADATA, seal_crate};
 use skinrig_protocol::{Publication, Selection};
 use skinrig_recorder::{RecorderError, SessionReader};
 
-use self::card::{Published, card};
+use self::card::Published;
+use self::documents::{description, documents, protocol_file};
 use self::headline::{FORMAT, Headline, Number, SelectionEntry, SessionNumbers};
 use crate::args::PublishArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -30,6 +31,8 @@ pub(crate) use self::reproduce::reproduce;
 
 /// Folder of the results with the selection.
 const SELECTED: &str = "selected";
+/// The file of `--about` in a crate.
+const ABOUT: &str = "publication.yaml";
 
 /// Writes the crate.
 ///
@@ -42,6 +45,10 @@ pub(crate) fn publish(args: &PublishArgs, json: bool) -> Outcome {
     let about = Publication::parse(&name, &about_bytes).map_err(|f| Failure::findings(&f))?;
     let targets = targets(&args.sessions)?;
     let stems = stems(&targets)?;
+    let selection_bytes = match &targets.selection {
+        Some(selection) => named_apart(selection, &stems)?,
+        None => Vec::new(),
+    };
     new_folder(&args.out)?;
     let mut numbers = Vec::new();
     let mut sessions = Vec::new();
@@ -57,16 +64,10 @@ pub(crate) fn publish(args: &PublishArgs, json: bool) -> Outcome {
         selection: targets.selection.as_ref().map(entry),
         sessions: numbers,
     };
-    let text = serde_json::to_string_pretty(&headline).map_err(Failure::internal)?;
-    write(&args.out.join(headline::FILE), text.as_bytes())?;
-    write(&args.out.join("publication.yaml"), &about_bytes)?;
-    if let Some(selection) = &targets.selection {
-        let bytes = read(Path::new(&selection.file_name))?;
-        write(&args.out.join(file_name(&selection.file_name)), &bytes)?;
+    let selection = targets.selection.as_ref().map(|s| (s, &*selection_bytes));
+    for (name, bytes) in documents((&about, &about_bytes), selection, &sessions, &headline)? {
+        write(&args.out.join(name), &bytes)?;
     }
-    let card = card(&about, &sessions, &headline, targets.selection.as_ref());
-    write(&args.out.join("README.md"), card.as_bytes())?;
-    write(&args.out.join("reproduce.sh"), SCRIPT.as_bytes())?;
     seal_crate(&args.out, &description(&about, &headline)).map_err(export::refused)?;
     if let Some(key) = &args.sign {
         signature::sign(key, &args.out.join(METADATA))?;
@@ -74,9 +75,6 @@ pub(crate) fn publish(args: &PublishArgs, json: bool) -> Outcome {
     print(args, &headline, json);
     Ok(Exit::Ok)
 }
-
-/// Derives the numbers again.
-const SCRIPT: &str = "#!/bin/sh\n# Compares every file with its checksum and derives every number again.\nexec skinrig reproduce \"$(dirname \"$0\")\" \"$@\"\n";
 
 fn print(args: &PublishArgs, headline: &Headline, json: bool) {
     let numbers: usize = headline.sessions.iter().map(|s| s.numbers.len()).sum();
@@ -157,6 +155,20 @@ fn stems(targets: &Targets) -> Result<Vec<String>, Failure> {
     Ok(stems)
 }
 
+/// The bytes of the selection's file, whose name no other file of the crate has.
+fn named_apart(selection: &Selection, stems: &[String]) -> Result<Vec<u8>, Failure> {
+    let name = file_name(&selection.file_name);
+    let is_protocol = |stem: &String| name == protocol_file(&format!("{stem}.bundle"));
+    if name == ABOUT || stems.iter().any(is_protocol) {
+        return Err(Failure::input(format!(
+            "{}: expected a selection with another name, found that of another file of the crate\n  next: rename it, for example to \
+             NAME.selection.yaml",
+            selection.file_name
+        )));
+    }
+    read(Path::new(&selection.file_name))
+}
+
 fn new_folder(path: &Path) -> Result<(), Failure> {
     let is_empty = std::fs::read_dir(path).map(|mut files| files.next().is_none());
     if path.symlink_metadata().is_ok() && !is_empty.unwrap_or(false) {
@@ -171,6 +183,17 @@ fn new_folder(path: &Path) -> Result<(), Failure> {
             path.display()
         ))
     })
+}
+
+/// Names in a folder, in order.
+fn names_in(folder: &Path) -> Result<Vec<String>, Failure> {
+    let mut found = Vec::new();
+    for file in std::fs::read_dir(folder).map_err(Failure::internal)? {
+        let name = file.map_err(Failure::internal)?.file_name();
+        found.push(name.to_string_lossy().into_owned());
+    }
+    found.sort();
+    Ok(found)
 }
 
 fn file_name(path: &str) -> String {
@@ -197,10 +220,6 @@ fn one_session(
     let bundle = format!("{stem}.bundle");
     let folder = Folder::new(&out.join(&bundle), stem, false).map_err(export::refused)?;
     export::bundle(&target.path, &reader, &header, &folder)?;
-    write(
-        &out.join(format!("{stem}.protocol.yaml")),
-        header.protocol_text.as_bytes(),
-    )?;
     let session_id = reader.session_id().map_err(Failure::session)?;
     let copy = folder.file(SESSION_SUFFIX);
     let official = official(&copy, &session_id)?;
@@ -222,18 +241,30 @@ fn one_session(
             analysis.invalid_because().join("\n  ")
         )));
     }
+    described(&reader, analysis, without.as_ref(), bundle)
+}
+
+/// What a crate states of a session with this analysis.
+fn described(
+    reader: &SessionReader,
+    analysis: Analysis,
+    without: Option<&Estimate>,
+    bundle: String,
+) -> Result<(SessionNumbers, Published), Failure> {
+    let header = reader.header().map_err(Failure::session)?;
     let provenance =
-        provenance::provenance(&reader, &header, &analysis).map_err(Failure::session)?;
+        provenance::provenance(reader, &header, &analysis).map_err(Failure::session)?;
     let numbers = SessionNumbers {
         bundle: bundle.clone(),
-        session_id,
+        session_id: reader.session_id().map_err(Failure::session)?,
         prototype: header.prototype.clone(),
-        content_sha256: content(&reader).map_err(Failure::session)?,
-        numbers: Number::all(&analysis, without.as_ref()),
+        content_sha256: content(reader).map_err(Failure::session)?,
+        numbers: Number::all(&analysis, without),
     };
     let published = Published {
         bundle,
         provenance,
+        protocol_text: header.protocol_text,
         analysis,
     };
     Ok((numbers, published))
@@ -279,56 +310,4 @@ fn with_selection(
     let header = reader.header().map_err(Failure::session)?;
     export::results_and_tables(&results, &reader, &header, folder)?;
     Ok(results.analysis)
-}
-
-/// What the crate states beside its files.
-fn description(about: &Publication, headline: &Headline) -> CrateDescription {
-    let folders = headline.sessions.iter().map(|session| {
-        let what = format!(
-            "Session {} of prototype {}, and everything that follows from it.",
-            session.session_id, session.prototype
-        );
-        (session.bundle.clone(), what)
-    });
-    let mut folders: BTreeMap<String, String> = folders.collect();
-    if let Some(selection) = &headline.selection {
-        let what = format!("Results and tables with the selection {}.", selection.name);
-        folders.insert(SELECTED.to_owned(), what);
-    }
-    let selected = headline.selection.as_ref();
-    let selected = selected.map_or_else(String::new, |s| format!(", selection {}", s.name));
-    let numbers = headline.sessions.iter().flat_map(|session| {
-        let is_rmse = |n: &&Number| n.metric == "rmse" && n.unit == "mm";
-        session.numbers.iter().filter(is_rmse).map(|n| CrateNumber {
-            name: format!("{} of {}{selected}", n.name(), session.bundle),
-            value: n.value,
-            unit: "mm",
-        })
-    });
-    CrateDescription {
-        title: about.title.clone(),
-        description: about.description.clone(),
-        license: about.license.clone(),
-        published_on: about.published_on.clone(),
-        people: about.people.iter().map(person).collect(),
-        publisher: about.publisher.as_ref().map(organisation),
-        software: headline.software.clone(),
-        numbers: numbers.collect(),
-        folders,
-    }
-}
-
-fn person(person: &Person) -> CratePerson {
-    CratePerson {
-        id: person.id(),
-        name: person.name.clone(),
-        affiliation: person.affiliation.as_ref().map(organisation),
-    }
-}
-
-fn organisation(place: &Organisation) -> CrateOrganisation {
-    CrateOrganisation {
-        url: place.url.clone(),
-        name: place.name.clone(),
-    }
 }

@@ -4,12 +4,16 @@ use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::{Component, Path};
 
-use serde::Serialize;
 use skinrig_analysis::Analysis;
-use skinrig_export::{Folder, METADATA, same_bytes, verify_crate};
+use skinrig_export::{METADATA, compare_description, same_bytes, verify_crate};
+use skinrig_protocol::{Publication, Selection};
+use skinrig_recorder::SessionReader;
 
-use super::headline::{FILE, FORMAT, Headline, Number, SessionNumbers};
-use super::{SELECTED, selected_folder, with_selection};
+use super::card::Published;
+use super::checks::{Check, Checks};
+use super::documents::{description, documents};
+use super::headline::{FILE, FORMAT, Headline, SessionNumbers};
+use super::{ABOUT, SELECTED, described, selected_folder, with_selection};
 use crate::args::ReproduceArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::selection::{self, SelectedPresses};
@@ -20,54 +24,6 @@ use crate::version::SOFTWARE;
 /// Largest file of numbers, bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// One comparison.
-#[derive(Debug, Serialize)]
-struct Check {
-    /// What was compared.
-    what: String,
-    pass: bool,
-    expected: String,
-    found: String,
-}
-
-impl Check {
-    fn pass(what: impl Into<String>, found: impl Into<String>) -> Self {
-        let found = found.into();
-        Self {
-            what: what.into(),
-            pass: true,
-            expected: found.clone(),
-            found,
-        }
-    }
-
-    fn fail(
-        what: impl Into<String>,
-        expected: impl Into<String>,
-        found: impl Into<String>,
-    ) -> Self {
-        Self {
-            what: what.into(),
-            pass: false,
-            expected: expected.into(),
-            found: found.into(),
-        }
-    }
-
-    fn print(&self) {
-        if self.pass {
-            outln!("PASS  {}: {}", self.what, self.found);
-        } else {
-            outln!(
-                "FAIL  {}: expected {}, found {}",
-                self.what,
-                self.expected,
-                self.found
-            );
-        }
-    }
-}
-
 /// Checks the crate.
 ///
 /// # Errors
@@ -76,12 +32,9 @@ pub(crate) fn reproduce(args: &ReproduceArgs, json: bool) -> Outcome {
     let folder = &args.folder;
     let report = verify_crate(folder).map_err(Failure::input)?;
     let headline = headline(folder)?;
-    let mut checks = Vec::new();
-    let mut add = |check: Check| {
-        if !json {
-            check.print();
-        }
-        checks.push(check);
+    let mut checks = Checks {
+        is_quiet: json,
+        ..Checks::default()
     };
     if !json {
         outln!(
@@ -92,42 +45,46 @@ pub(crate) fn reproduce(args: &ReproduceArgs, json: bool) -> Outcome {
     }
     match signature::verify(&folder.join(METADATA), args.signers.as_deref()) {
         Ok(None) => {}
-        Ok(Some(signature)) => add(Check::pass("signature", signature.to_string())),
-        Err(e) if e.is_verdict() => add(Check::fail("signature", "one that counts", e.to_string())),
+        Ok(Some(signature)) => checks.add(Check::pass("signature", signature.to_string())),
+        Err(e) if e.is_verdict() => {
+            checks.add(Check::fail("signature", "one that counts", e.to_string()))
+        }
         Err(e) => return Err(e.into()),
     }
-    for problem in &report.problems {
-        add(Check::fail(
-            &*problem.place,
-            &*problem.expected,
-            &*problem.found,
-        ));
-    }
+    report.problems.iter().for_each(|p| checks.fail(p));
     if report.problems.is_empty() {
-        add(Check::pass(
+        checks.add(Check::pass(
             "checksums",
             format!("{} files", report.files.len()),
         ));
     }
     for bundle in unnamed(folder, &headline)? {
-        add(Check::fail(
+        checks.add(Check::fail(
             bundle,
             "numbers of this session, too",
             "none in the list of numbers",
         ));
     }
-    let selected = selected(folder, &headline, &mut add);
+    let selected = selected(folder, &headline, &mut checks);
+    let mut derived = Vec::new();
     for session in &headline.sessions {
         let presses = selected
             .as_ref()
-            .map(|all| all.get(&session.content_sha256));
-        check_session(folder, session, presses, &mut add)?;
+            .map(|(_, all)| all.get(&session.content_sha256));
+        derived.extend(check_session(folder, session, presses, &mut checks)?);
     }
-    let failed = checks.iter().filter(|c| !c.pass).count();
+    // What follows from anything that failed cannot be derived.
+    if checks.failed() == 0 {
+        let selection = selected
+            .as_ref()
+            .and_then(|(selection, _)| selection.as_ref());
+        check_documents(folder, &headline, derived, selection, &mut checks)?;
+    }
+    let failed = checks.failed();
     if json {
         crate::terminal::print_json(&serde_json::json!({
             "crate": folder, "name": report.name, "published_with": headline.software, "this": SOFTWARE,
-            "selection": headline.selection, "checks": checks, "reproduced": failed == 0,
+            "selection": headline.selection, "checks": checks.all, "reproduced": failed == 0,
         }));
     }
     if failed == 0 {
@@ -140,7 +97,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs, json: bool) -> Outcome {
     Err(Failure::limit(format!(
         "{}: {failed} of {} checks FAIL\n  next: {version}",
         folder.display(),
-        checks.len()
+        checks.all.len()
     )))
 }
 
@@ -180,17 +137,13 @@ fn headline(folder: &Path) -> Result<Headline, Failure> {
 
 /// Bundles in the crate of which it states no number.
 fn unnamed(folder: &Path, headline: &Headline) -> Result<Vec<String>, Failure> {
-    let mut found = Vec::new();
-    for file in std::fs::read_dir(folder).map_err(Failure::internal)? {
-        let name = file.map_err(Failure::internal)?.file_name();
-        let name = name.to_string_lossy().into_owned();
+    let is_named = |name: &String| {
         let mut named = headline.sessions.iter().filter(|s| !s.numbers.is_empty());
-        if name.ends_with(".bundle") && !named.any(|s| s.bundle == name) {
-            found.push(name);
-        }
-    }
-    found.sort();
-    Ok(found)
+        named.any(|s| s.bundle == *name)
+    };
+    let mut names = super::names_in(folder)?;
+    names.retain(|name| name.ends_with(".bundle") && !is_named(name));
+    Ok(names)
 }
 
 /// True for the name of something directly in the folder.
@@ -202,38 +155,36 @@ fn is_plain(name: &str) -> bool {
     )
 }
 
-/// The selected presses by the hash of the session's content; `None` without a selection, empty for one that does not fit, which
-/// is a failed check.
-fn selected(
-    folder: &Path,
-    headline: &Headline,
-    add: &mut impl FnMut(Check),
-) -> Option<BTreeMap<String, SelectedPresses>> {
+/// A selection, and its presses by the hash of the session's content.
+type Selected = (Option<Selection>, BTreeMap<String, SelectedPresses>);
+
+/// `None` without a selection, empty for one that does not fit, which is a failed check.
+fn selected(folder: &Path, headline: &Headline, checks: &mut Checks) -> Option<Selected> {
     let expected = headline.selection.as_ref()?;
     let found = match selection::sessions(&folder.join(&expected.file)) {
         Ok(found) => found,
         Err(failure) => {
-            add(Check::fail(
+            checks.add(Check::fail(
                 "selection",
                 expected.sha256.as_str(),
                 failure.message,
             ));
-            return Some(BTreeMap::new());
+            return Some(Selected::default());
         }
     };
     let Some(read) = found.selection else {
-        add(Check::fail(
+        checks.add(Check::fail(
             "selection",
             expected.sha256.as_str(),
             "a session",
         ));
-        return Some(BTreeMap::new());
+        return Some(Selected::default());
     };
     let what = format!("selection `{}`", expected.name);
-    add(
+    checks.add(
         match (&read.name, &read.sha256) == (&expected.name, &expected.sha256) {
             true => Check::pass(what, format!("SHA-256 {}", read.sha256)),
-            false => Check::fail(what, expected.sha256.as_str(), read.sha256),
+            false => Check::fail(what, expected.sha256.as_str(), read.sha256.as_str()),
         },
     );
     let hashes = read.sessions.iter().map(|s| s.content_sha256.clone());
@@ -241,23 +192,33 @@ fn selected(
         .sessions
         .into_iter()
         .filter_map(|target| target.selected);
-    Some(hashes.zip(presses).collect())
+    let presses = hashes.zip(presses).collect();
+    Some((Some(read), presses))
 }
 
-/// Derives the files and numbers of one session again.
+/// A session with what a crate states of it.
+struct Derived {
+    numbers: SessionNumbers,
+    published: Published,
+    /// Names of its files with the selection.
+    selected: Vec<String>,
+}
+
+/// Derives the files and numbers of one session again; `None` if that is impossible.
 fn check_session(
     folder: &Path,
     session: &SessionNumbers,
     selected: Option<Option<&SelectedPresses>>,
-    add: &mut impl FnMut(Check),
-) -> Result<(), Failure> {
+    checks: &mut Checks,
+) -> Result<Option<Derived>, Failure> {
     let name = &session.bundle;
     let scratch = Scratch::new()?;
     let bundle = match verify::check_bundle(&folder.join(name), &scratch, Derivation::Always) {
         Ok(bundle) => bundle,
         Err(failure) => {
-            add(Check::fail(name.as_str(), "a bundle", failure.message));
-            return not_derived(session, add);
+            checks.add(Check::fail(name.as_str(), "a bundle", failure.message));
+            not_derived(session, checks);
+            return Ok(None);
         }
     };
     let problems = bundle.report.problems.iter();
@@ -269,32 +230,40 @@ fn check_session(
             "{} files follow from the sealed session",
             bundle.report.files - 1
         );
-        add(Check::pass(name.as_str(), files));
+        checks.add(Check::pass(name.as_str(), files));
     }
-    problems.into_iter().for_each(&mut *add);
+    problems.into_iter().for_each(|check| checks.add(check));
     let (true, Some(official)) = (
         bundle.content_sha256 == session.content_sha256,
         bundle.analysis,
     ) else {
-        add(Check::fail(
+        checks.add(Check::fail(
             format!("{name}: session"),
             format!("the content {}", session.content_sha256),
             format!("{}, or damage", bundle.content_sha256),
         ));
-        return not_derived(session, add);
+        not_derived(session, checks);
+        return Ok(None);
     };
-    let found = match selected {
-        None => Number::all(&official, None),
-        Some(None) => return not_derived(session, add),
+    let copy = folder.join(name).join(&bundle.report.session);
+    let (analysis, without, selected) = match selected {
+        None => (official, None, Vec::new()),
+        Some(None) => {
+            not_derived(session, checks);
+            return Ok(None);
+        }
         Some(Some(presses)) => {
-            let copy = folder.join(name).join(&bundle.report.session);
-            let analysis = with_selection_again(folder, session, presses, &copy, &scratch, add)?;
-            Number::all(&analysis, Some(&official.scored.rmse_mm))
+            let (analysis, files) =
+                with_selection_again(folder, session, presses, &copy, &scratch, checks)?;
+            (analysis, Some(official.scored.rmse_mm), files)
         }
     };
+    let reader = SessionReader::open(&copy).map_err(Failure::session)?;
+    let (numbers, published) = described(&reader, analysis, without.as_ref(), name.clone())?;
+    let found = &numbers.numbers;
     for number in &session.numbers {
         let what = format!("{name}: {}", number.name());
-        add(match number.among(&found) {
+        checks.add(match number.among(found) {
             Some(again) if again.is(number) => Check::pass(what, again.text()),
             Some(again) => Check::fail(what, number.text(), again.text()),
             None => Check::fail(what, number.text(), "no such number"),
@@ -302,71 +271,134 @@ fn check_session(
     }
     for number in found.iter().filter(|n| n.among(&session.numbers).is_none()) {
         let what = format!("{name}: {}", number.name());
-        add(Check::fail(what, "no such number", number.text()));
+        checks.add(Check::fail(what, "no such number", number.text()));
+    }
+    Ok(Some(Derived {
+        numbers,
+        published,
+        selected,
+    }))
+}
+
+/// Compares the data card and all other files beside bundles and results with those that follow from the sessions, and the description
+/// with what it must state.
+fn check_documents(
+    folder: &Path,
+    headline: &Headline,
+    derived: Vec<Derived>,
+    selection: Option<&Selection>,
+    checks: &mut Checks,
+) -> Result<(), Failure> {
+    let about_bytes = super::read(&folder.join(ABOUT))?;
+    let about = Publication::parse(ABOUT, &about_bytes).map_err(|f| Failure::findings(&f))?;
+    let selection_bytes = match &headline.selection {
+        Some(entry) => super::read(&folder.join(&entry.file))?,
+        None => Vec::new(),
+    };
+    let selection = selection.map(|s| (s, &*selection_bytes));
+    let (mut numbers, mut sessions, mut selected) = (Vec::new(), Vec::new(), Vec::new());
+    for session in derived {
+        numbers.push(session.numbers);
+        sessions.push(session.published);
+        selected.extend(session.selected);
+    }
+    let again = Headline {
+        format: FORMAT.0.to_owned(),
+        format_version: FORMAT.1,
+        sessions: numbers,
+        ..headline.clone()
+    };
+    let files = documents((&about, &about_bytes), selection, &sessions, &again)?;
+    for (name, bytes) in &files {
+        let found = std::fs::read(folder.join(name)).ok();
+        if found.as_ref() != Some(bytes) {
+            checks.add(Check::fail(
+                name.as_str(),
+                "the content that follows from the sessions",
+                "other content, or none",
+            ));
+        }
+    }
+    for name in super::names_in(folder)? {
+        let is_bundle = again.sessions.iter().any(|s| s.bundle == name);
+        let is_selected = name == SELECTED && selection.is_some();
+        let is_description = name == METADATA || skinrig_export::is_signature(&name);
+        if !(files.contains_key(&name) || is_bundle || is_selected || is_description) {
+            checks.add(Check::fail(name, "only files of a crate", "another file"));
+        }
+    }
+    if selection.is_some() {
+        let mut others = super::names_in(&folder.join(SELECTED))?;
+        others.retain(|name| !selected.contains(name));
+        for name in others {
+            let what = format!("{SELECTED}/{name}");
+            checks.add(Check::fail(
+                what,
+                "only results with the selection",
+                "another file",
+            ));
+        }
+    }
+    let described = compare_description(folder, &description(&about, &again));
+    let described = described.map_err(Failure::internal)?;
+    described.iter().for_each(|p| checks.fail(p));
+    if checks.failed() == 0 {
+        let what = format!(
+            "{} files and the description follow from the sessions",
+            files.len()
+        );
+        checks.add(Check::pass("documents", what));
     }
     Ok(())
 }
 
-/// Analyses the session with its selection, and compares the files with those in the crate.
+/// Analyses the session with its selection, and compares the files with those in the crate. Returns their names, too.
 fn with_selection_again(
     folder: &Path,
     session: &SessionNumbers,
     presses: &SelectedPresses,
     copy: &Path,
     scratch: &Scratch,
-    add: &mut impl FnMut(Check),
-) -> Result<Analysis, Failure> {
+    checks: &mut Checks,
+) -> Result<(Analysis, Vec<String>), Failure> {
     let stem = session
         .bundle
         .strip_suffix(".bundle")
         .unwrap_or(&session.bundle);
     let again = selected_folder(scratch.path(), stem, presses)?;
     let analysis = with_selection(copy, presses, &again)?;
-    let (mut compared, mut equal) = (0, 0);
-    for file in list(&again)? {
-        let name = file.file_name().unwrap_or_default();
+    let names = super::names_in(again.path())?;
+    let mut equal = 0;
+    for name in &names {
         let published = folder.join(SELECTED).join(name);
-        compared += 1;
-        if same_bytes(&file, &published).unwrap_or(false) {
+        if same_bytes(&again.path().join(name), &published).unwrap_or(false) {
             equal += 1;
         } else {
-            let what = format!("{SELECTED}/{}", name.to_string_lossy());
-            add(Check::fail(
-                what,
+            checks.add(Check::fail(
+                format!("{SELECTED}/{name}"),
                 "the content that follows from the session",
                 "other content, or none",
             ));
         }
     }
-    if equal == compared {
+    if equal == names.len() {
         let what = format!("{}: with the selection", session.bundle);
-        add(Check::pass(
+        checks.add(Check::pass(
             what,
             format!("{equal} files follow from the session"),
         ));
     }
-    Ok(analysis)
-}
-
-fn list(folder: &Folder) -> Result<Vec<std::path::PathBuf>, Failure> {
-    let files = std::fs::read_dir(folder.path()).map_err(Failure::internal)?;
-    let mut paths = Vec::new();
-    for file in files {
-        paths.push(file.map_err(Failure::internal)?.path());
-    }
-    paths.sort();
-    Ok(paths)
+    Ok((analysis, names))
 }
 
 /// Each number of a session that could not be analysed.
-fn not_derived(session: &SessionNumbers, add: &mut impl FnMut(Check)) -> Result<(), Failure> {
+fn not_derived(session: &SessionNumbers, checks: &mut Checks) {
     for number in &session.numbers {
         let what = format!("{}: {}", session.bundle, number.name());
-        add(Check::fail(
+        checks.add(Check::fail(
             what,
             number.text(),
             "nothing: the session or its selection cannot be used",
         ));
     }
-    Ok(())
 }

@@ -171,6 +171,83 @@ fn a_published_selection_is_derived_again_elsewhere_and_any_edit_fails() {
         .expect_stderr(&["expected an RO-Crate 1.1"]);
 }
 
+/// What people read is derived again, too: the data card, the numbers in the description, the protocol; and nothing else is there.
+#[test]
+fn the_card_and_the_description_follow_from_the_sessions() {
+    let lab = Lab::new();
+    let folder = published(&lab, true);
+    let metadata = folder.join("ro-crate-metadata.json");
+    let whole = std::fs::read(&metadata).unwrap();
+    let fails = |part: &str| {
+        let failed = reproduce(&folder).code(4).out;
+        assert!(failed.contains(part), "{part} in {failed}");
+        std::fs::write(&metadata, &whole).unwrap();
+    };
+    let protocol = only(&folder, ".protocol.yaml");
+    let protocol = protocol.file_name().unwrap().to_str().unwrap();
+    for (name, from, to) in [
+        (
+            "README.md",
+            "SIMULATED, not measured on hardware",
+            "bench 4",
+        ),
+        ("README.md", "| scored rmse | ", "| scored rmse | 0."),
+        ("reproduce.sh", "exec skinrig", "exec true"),
+        (protocol, "operator: ", "operator: B. "),
+    ] {
+        let before = std::fs::read(folder.join(name)).unwrap();
+        forge(&folder, name, from, to);
+        fails(&format!("FAIL  {name}: expected the content that follows"));
+        std::fs::write(folder.join(name), before).unwrap();
+    }
+
+    let edit = |change: &dyn Fn(&mut Vec<Value>)| {
+        let mut document = read_json(&metadata);
+        change(document["@graph"].as_array_mut().unwrap());
+        std::fs::write(&metadata, document.to_string()).unwrap();
+    };
+    let value = |graph: &mut Vec<Value>| {
+        let entity = graph.iter_mut().find(|e| e["@id"] == "#number-1");
+        entity.unwrap()["value"] = 0.125.into();
+    };
+    edit(&value);
+    fails("FAIL  ro-crate-metadata.json: #number-1: expected {");
+    edit(&|graph| graph.push(serde_json::json!({"@id": "#number-99", "@type": "PropertyValue"})));
+    fails("FAIL  ro-crate-metadata.json: #number-99: expected no such entity");
+
+    // A file that nothing derives, with a description that fits.
+    for name in ["more.csv", "selected/more.csv"] {
+        std::fs::write(folder.join(name), "x").unwrap();
+        edit(&|graph| {
+            graph.push(serde_json::json!({
+                "@id": name, "@type": "File", "contentSize": "1", "sha256": sha256(b"x"),
+            }));
+        });
+        fails(&format!("FAIL  {name}: expected only "));
+        std::fs::remove_file(folder.join(name)).unwrap();
+    }
+    reproduce(&folder).code(0);
+}
+
+/// No file of a crate replaces another one.
+#[test]
+fn a_selection_named_like_another_file_is_not_published() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let (about, selection) = (lab.text("about.yaml"), lab.text("publication.yaml"));
+    std::fs::write(&about, ABOUT).unwrap();
+    skinrig(&["select", &session, "--name", "all", "--out", &selection]).code(0);
+    let out = lab.text("crate");
+    let publish =
+        |selection: &str| skinrig(&["publish", selection, "--about", &about, "--out", &out]);
+    publish(&selection)
+        .code(2)
+        .expect_stderr(&["expected a selection with another name", "rename it"]);
+    let renamed = lab.text("all.selection.yaml");
+    std::fs::rename(&selection, &renamed).unwrap();
+    publish(&renamed).code(0);
+}
+
 #[test]
 fn other_programs_accept_the_crate() {
     let Ok(python) = std::env::var("SKINRIG_PYTHON") else {
