@@ -10,6 +10,7 @@ use skinrig_model::SENSOR_WIDTH;
 
 use crate::scene::SceneConfig;
 
+use super::column::LANES;
 use super::config::OpticalConfig;
 use super::light::{Column, Illumination, Vec2, dot};
 use super::optics::Optics;
@@ -77,7 +78,7 @@ pub(super) struct Dent {
     pub(super) shadow: Vec<f64>,
     /// Light returned by the flanks in units of the column's undisturbed light and of `x`, for each column.
     pub(super) shine: Vec<f64>,
-    /// Weights of shadow and shine, for each row of the skin.
+    /// Weights of shadow and shine, for each row of the skin, in whole blocks of rows.
     pub(super) shadow_rows: Vec<f32>,
     pub(super) shine_rows: Vec<f32>,
 }
@@ -267,9 +268,9 @@ impl Image {
     /// Gaussian weights of the skin's rows, within the image's extent.
     fn weights(&self, scene: &SceneConfig, centre: f64, sigma: f64) -> Vec<f32> {
         let reach = ROW_SIGMAS * self.sigma;
-        scene
-            .rows()
-            .map(|v| v as f64)
+        let rows = scene.rows();
+        let padding = rows.len().next_multiple_of(LANES) - rows.len();
+        rows.map(|v| v as f64)
             .map(|v| {
                 if (v - self.centre).abs() > reach {
                     return 0.0;
@@ -277,6 +278,7 @@ impl Image {
                 let z = (v - centre) / sigma;
                 libm::exp(-0.5 * z * z) as f32
             })
+            .chain(std::iter::repeat_n(0.0, padding))
             .collect()
     }
 }

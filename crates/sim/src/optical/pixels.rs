@@ -1,8 +1,8 @@
 //! The pixels of one camera: thresholds and refractory time.
 //!
 //! A pixel stores the light at its last event and emits the next one when the light has changed by its threshold (in log
-//! intensity). Each pixel stores the two lights at which it emits next, and each column the least change of light that reaches
-//! one of them: no other column is evaluated while dents move.
+//! intensity). Each pixel stores the two lights at which it emits next, and each block of rows and each column the least change of
+//! light that reaches one of them: no other block is evaluated while dents move.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use skinrig_simd::InstructionSet;
 use crate::random::Stream;
 use crate::scene::{GRID_NS, PixelEvent, SceneConfig};
 
-use super::column::{Block, ColumnLight, LANES, Rows, crossed_blocks, least_slack, lesser};
+use super::column::{Block, LANES, Rows, lesser};
 use super::config::OpticalConfig;
 use super::refractory::{Refractory, RefractoryTimes};
 use super::touches::Touches;
@@ -34,10 +34,10 @@ pub(super) struct Pixels {
     refractory_us: RefractoryTimes,
     /// Per column: least change of its lost light since the last evaluation that can cause an event.
     slack: Vec<f32>,
+    /// The same per block of rows, as of the column's last evaluation.
+    block_slack: Vec<f32>,
     /// No column has an event before one has lost or regained so much light.
     margin: f32,
-    /// The column that was evaluated last.
-    column: ColumnLight,
     instructions: InstructionSet,
 }
 
@@ -73,7 +73,6 @@ impl Pixels {
             block.bounds.down[lane] = (reference * down) as f32;
         }
         Self {
-            column: ColumnLight::new(blocks * LANES),
             instructions: InstructionSet::best(),
             rows,
             blocks,
@@ -81,6 +80,7 @@ impl Pixels {
             refractory: Refractory::new(),
             refractory_us: RefractoryTimes::new(scene, config),
             slack: vec![f32::NEG_INFINITY; WIDTH],
+            block_slack: vec![f32::NEG_INFINITY; WIDTH * blocks],
             margin: f32::NEG_INFINITY,
         }
     }
@@ -93,6 +93,8 @@ impl Pixels {
         }
         for columns in &touches.disturbed {
             self.slack[columns.clone()].fill(f32::NEG_INFINITY);
+            let blocks = columns.start * self.blocks..columns.end * self.blocks;
+            self.block_slack[blocks].fill(f32::NEG_INFINITY);
             self.margin = f32::NEG_INFINITY;
         }
         self.margin -= touches.largest_change();
@@ -132,6 +134,7 @@ impl Pixels {
     #[cfg(test)]
     pub(super) fn forget_slack(&mut self) {
         self.slack.fill(f32::NEG_INFINITY);
+        self.block_slack.fill(f32::NEG_INFINITY);
         self.margin = f32::NEG_INFINITY;
     }
 
@@ -224,31 +227,36 @@ impl Pixels {
         let left = (up - light[1]).min(light[1] - down) as f32;
         let slack = left / (touches.most(v) + f32::MIN_POSITIVE) - touches.change(u);
         self.slack[u] = lesser(self.slack[u], slack);
+        self.block_slack[pixel.0] = lesser(self.block_slack[pixel.0], slack);
         self.margin = lesser(self.margin, slack - touches.change(u));
         again_ns
     }
 
-    /// Emits the events of one column and stores the least change of its light that causes the next one.
+    /// Emits the events of one column and stores the least change of its light that causes the next one. Blocks that the
+    /// column's change of light cannot have taken to an event are not evaluated.
     fn evaluate(&mut self, touches: &mut Touches, u: usize, t_ns: i64, out: &mut Vec<PixelEvent>) {
+        let change = touches.change(u);
         let most = touches.evaluate(u);
-        let blocks = self.block(u, 0).0..self.block(u + 1, 0).0;
-        let column = &mut self.column;
-        let pixels = &self.pixels[blocks.clone()];
-        let mut least = self.instructions.run(
+        let first = u * self.blocks;
+        let blocks = first..first + self.blocks;
+        let (pixels, slack) = (
+            &self.pixels[blocks.clone()],
+            &mut self.block_slack[blocks.clone()],
+        );
+        let crossed = self.instructions.run(
             #[inline(always)]
             || {
-                touches.column(column);
-                least_slack(column, pixels)
+                for slack in &mut *slack {
+                    *slack -= change;
+                }
+                update(slack, pixels, touches)
             },
         );
-        if least < 0.0 {
-            let mut crossed = self.instructions.run(
-                #[inline(always)]
-                || crossed_blocks(column, pixels),
-            );
-            while crossed != 0 {
-                let block = crossed.trailing_zeros() as usize;
-                crossed &= crossed - 1;
+        if crossed != 0 {
+            let mut left = crossed;
+            while left != 0 {
+                let block = left.trailing_zeros() as usize;
+                left &= left - 1;
                 for v in block * LANES..self.rows.len().min((block + 1) * LANES) {
                     let light = touches.light(v);
                     if let Some(end_ns) = self.emit((u, v), light, t_ns, 0, out) {
@@ -257,13 +265,17 @@ impl Pixels {
                     }
                 }
             }
-            let (column, pixels) = (&self.column, &self.pixels[blocks]);
-            least = self.instructions.run(
+            let (pixels, slack) = (
+                &self.pixels[blocks.clone()],
+                &mut self.block_slack[blocks.clone()],
+            );
+            self.instructions.run(
                 #[inline(always)]
-                || least_slack(column, pixels),
+                || update(slack, pixels, touches),
             );
         }
-        self.slack[u] = lesser(least, most);
+        let least = self.block_slack[blocks].iter().copied().fold(most, lesser);
+        self.slack[u] = least;
     }
 
     /// Emits all events of one pixel, whose light changes linearly during the step, from `from_us` to its end. Returns the end of
@@ -318,4 +330,18 @@ impl Pixels {
 /// Light `us` after the start of a step.
 fn at_us(light: [f64; 2], us: i64) -> f64 {
     light[0] + (light[1] - light[0]) * (us as f64 / STEP_US as f64)
+}
+
+/// Evaluates the blocks of a column whose slack is used up. Returns one bit per block: whether a pixel is beyond its event. A column
+/// has at most 60 blocks.
+#[inline(always)]
+fn update(slack: &mut [f32], pixels: &[Block], touches: &Touches) -> u64 {
+    let mut crossed = 0;
+    for (n, (slack, pixels)) in slack.iter_mut().zip(pixels).enumerate() {
+        if *slack < 0.0 {
+            *slack = touches.block(n).slack(pixels);
+            crossed |= u64::from(*slack < 0.0) << n;
+        }
+    }
+    crossed
 }

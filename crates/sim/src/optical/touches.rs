@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use skinrig_model::{Point2, SENSOR_WIDTH};
 
-use super::column::{ColumnLight, greater, sensitivity};
+use super::column::{BlockLight, LANES, greater, sensitivity};
 use super::contact::{Contact, Relaxation};
 use super::dent::Dent;
 use super::light::Vec2;
@@ -270,14 +270,17 @@ impl Touches {
         (CURVATURE * MOST_DEPTH * least) as f32
     }
 
-    /// Light of the column's rows after the step.
+    /// Light of one of the column's blocks of rows after the step.
     #[inline(always)]
-    pub(super) fn column(&self, out: &mut ColumnLight) {
-        out.start(self.farthest() as f32);
+    pub(super) fn block(&self, block: usize) -> BlockLight {
+        let mut light = BlockLight::new(self.farthest() as f32);
         for (n, (sight, dent, joins)) in self.views().enumerate() {
+            let [shadow_rows, shine_rows] = [&dent.shadow_rows, &dent.shine_rows]
+                .map(|rows| &rows.as_chunks::<LANES>().0[block]);
             let constants = [sight.lost[1], sight.shadow, sight.shine, joins];
-            out.pass(dent, n == 0, constants.map(|x| x as f32));
+            light.pass(shadow_rows, shine_rows, n == 0, constants.map(|x| x as f32));
         }
+        light
     }
 }
 
