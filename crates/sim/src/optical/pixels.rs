@@ -101,28 +101,30 @@ impl Pixels {
         if self.margin > 0.0 {
             return;
         }
-        let mut changes = [0.0; WIDTH];
-        touches.changes(&mut changes);
-        let mut margin = [f32::INFINITY; LANES];
-        for (block, changes) in changes.as_chunks::<LANES>().0.iter().enumerate() {
-            let first = block * LANES;
-            let mut left = *changes;
-            for (left, slack) in left.iter_mut().zip(&self.slack[first..first + LANES]) {
-                *left = slack - *left;
-            }
-            if left.iter().any(|x| *x < 0.0) {
-                for (left, u) in left.iter_mut().zip(first..) {
-                    if *left < 0.0 {
-                        self.evaluate(touches, u, t_ns, out);
-                        *left = self.slack[u];
-                    }
+        let columns = touches.columns();
+        let mut left = [0.0; WIDTH];
+        touches.changes(&mut left);
+        let left = &mut left[columns.clone()];
+        let slack = &self.slack[columns.clone()];
+        let mut due = self.instructions.run(
+            #[inline(always)]
+            || subtract_from(slack, left),
+        );
+        while due != 0 {
+            let first = due.trailing_zeros() as usize * LANES;
+            due &= due - 1;
+            for k in first..first + LANES {
+                if left[k] < 0.0 {
+                    let u = columns.start + k;
+                    self.evaluate(touches, u, t_ns, out);
+                    left[k] = self.slack[u];
                 }
             }
-            for (margin, left) in margin.iter_mut().zip(left) {
-                *margin = lesser(*margin, left);
-            }
         }
-        self.margin = margin.into_iter().fold(f32::INFINITY, lesser);
+        self.margin = self.instructions.run(
+            #[inline(always)]
+            || least(left),
+        );
     }
 
     #[cfg(test)]
@@ -218,6 +220,7 @@ impl Pixels {
             return None;
         }
         touches.look(u);
+        touches.look_back(u);
         let light = touches.light(v);
         let us = ((end_ns - t_ns) / NS_PER_US).max(0);
         self.set_reference(pixel, at_us(light, us));
@@ -253,6 +256,7 @@ impl Pixels {
             },
         );
         if crossed != 0 {
+            touches.look_back(u);
             let mut left = crossed;
             while left != 0 {
                 let block = left.trailing_zeros() as usize;
@@ -330,6 +334,41 @@ impl Pixels {
 /// Light `us` after the start of a step.
 fn at_us(light: [f64; 2], us: i64) -> f64 {
     light[0] + (light[1] - light[0]) * (us as f64 / STEP_US as f64)
+}
+
+/// Subtracts each change from its slack. Returns one bit per block of columns: whether one's slack is used up. There are at most 80
+/// blocks.
+#[inline(always)]
+fn subtract_from(slack: &[f32], changes: &mut [f32]) -> u128 {
+    let mut due = 0;
+    let blocks = slack.as_chunks::<LANES>().0;
+    for (n, (left, slack)) in changes
+        .as_chunks_mut::<LANES>()
+        .0
+        .iter_mut()
+        .zip(blocks)
+        .enumerate()
+    {
+        let mut any = false;
+        for k in 0..LANES {
+            left[k] = slack[k] - left[k];
+            any |= left[k] < 0.0;
+        }
+        due |= u128::from(any) << n;
+    }
+    due
+}
+
+/// The least of whole blocks of values.
+#[inline(always)]
+fn least(values: &[f32]) -> f32 {
+    let mut least = [f32::INFINITY; LANES];
+    for block in values.as_chunks::<LANES>().0 {
+        for k in 0..LANES {
+            least[k] = lesser(least[k], block[k]);
+        }
+    }
+    least.into_iter().fold(f32::INFINITY, lesser)
 }
 
 /// Evaluates the blocks of a column whose slack is used up. Returns one bit per block: whether a pixel is beyond its event. A column

@@ -66,8 +66,10 @@ struct Sight {
     /// Part of the light that comes from behind the dent, and what its flanks return.
     shadow: f64,
     shine: f64,
-    /// Lost light before and after the step.
-    lost: [f64; 2],
+    /// Lost light after the step.
+    lost: f64,
+    /// The same before the step, once [`Touches::look_back`] is called.
+    lost_before: f64,
 }
 
 /// All dents in the skin: those of the tips first, then those that relax.
@@ -171,6 +173,16 @@ impl Touches {
         (CURVATURE * self.all.iter().map(of).sum::<f64>()) as f32
     }
 
+    /// Columns that a dent can change, widened to whole blocks of [`LANES`].
+    pub(super) fn columns(&self) -> Range<usize> {
+        let seen = self.all.iter().filter(|t| !t.contact.is_unseen());
+        let columns = seen.map(|t| &t.dent.columns).filter(|c| !c.is_empty());
+        let (first, end) = columns.fold((WIDTH, 0), |(first, end), c| {
+            (c.start.min(first), c.end.max(end))
+        });
+        first.min(end) / LANES * LANES..end.next_multiple_of(LANES)
+    }
+
     /// At least the change of each column's lost light since its last evaluation, all dents together.
     pub(super) fn changes(&self, out: &mut [f32; WIDTH]) {
         out.fill(0.0);
@@ -196,7 +208,7 @@ impl Touches {
         self.all.iter().map(of).sum()
     }
 
-    /// Looks along column `u`: the next calls are about it.
+    /// Looks along column `u`: the next calls are about it, after the step until [`Self::look_back`] is called.
     pub(super) fn look(&mut self, u: usize) {
         self.sights.clear();
         for (touch, t) in self.all.iter().enumerate() {
@@ -205,13 +217,22 @@ impl Touches {
                     touch,
                     shadow: t.dent.shadow[u],
                     shine: t.dent.shine[u],
-                    lost: t.contact.seen_mm.map(|mm| t.dent.lost(u, mm)),
+                    lost: t.dent.lost(u, t.contact.seen_mm[1]),
+                    lost_before: f64::NAN,
                 });
             }
         }
         // The farther the dent, the less light comes from behind it.
         self.sights
             .sort_unstable_by(|a, b| a.shadow.total_cmp(&b.shadow).then(a.touch.cmp(&b.touch)));
+    }
+
+    /// Looks at column `u`, which is looked along, before the step too.
+    pub(super) fn look_back(&mut self, u: usize) {
+        for sight in &mut self.sights {
+            let touch = &self.all[sight.touch];
+            sight.lost_before = touch.dent.lost(u, touch.contact.seen_mm[0]);
+        }
     }
 
     /// Each dent in the view of the column, the farthest first, with the light that joins in front of it.
@@ -229,13 +250,13 @@ impl Touches {
         self.sights.first().map_or(1.0, |s| s.shadow)
     }
 
-    /// Light of the skin's row `v` before and after the step; 1 without dents.
+    /// Light of the skin's row `v` before and after the step, for a column that was looked back at; 1 without dents.
     pub(super) fn light(&self, v: usize) -> [f64; 2] {
         let mut light = [self.farthest(); 2];
         for (sight, dent, joins) in self.views() {
             let shadow = f64::from(dent.shadow_rows[v]);
             let shine = sight.shine * f64::from(dent.shine_rows[v]);
-            for (light, lost) in light.iter_mut().zip(sight.lost) {
+            for (light, lost) in light.iter_mut().zip([sight.lost_before, sight.lost]) {
                 *light += lost * (shine - shadow * *light) + joins;
             }
         }
@@ -263,7 +284,7 @@ impl Touches {
         }
         let mut least = 1.0;
         for sight in &self.sights {
-            let left = 1.0 - sight.lost[1];
+            let left = 1.0 - sight.lost;
             least = left.min(least);
             self.all[sight.touch].lost_per_mm[u] *= left as f32;
         }
@@ -277,7 +298,7 @@ impl Touches {
         for (n, (sight, dent, joins)) in self.views().enumerate() {
             let [shadow_rows, shine_rows] = [&dent.shadow_rows, &dent.shine_rows]
                 .map(|rows| &rows.as_chunks::<LANES>().0[block]);
-            let constants = [sight.lost[1], sight.shadow, sight.shine, joins];
+            let constants = [sight.lost, sight.shadow, sight.shine, joins];
             light.pass(shadow_rows, shine_rows, n == 0, constants.map(|x| x as f32));
         }
         light
