@@ -113,11 +113,11 @@ impl Pixels {
         while due != 0 {
             let first = due.trailing_zeros() as usize * LANES;
             due &= due - 1;
-            for k in first..first + LANES {
-                if left[k] < 0.0 {
+            for (left, k) in left[first..first + LANES].iter_mut().zip(first..) {
+                if *left < 0.0 {
                     let u = columns.start + k;
                     self.evaluate(touches, u, t_ns, out);
-                    left[k] = self.slack[u];
+                    *left = self.slack[u];
                 }
             }
         }
@@ -278,8 +278,12 @@ impl Pixels {
                 || update(slack, pixels, touches),
             );
         }
-        let least = self.block_slack[blocks].iter().copied().fold(most, lesser);
-        self.slack[u] = least;
+        let slack = &self.block_slack[blocks];
+        let left = self.instructions.run(
+            #[inline(always)]
+            || least(slack),
+        );
+        self.slack[u] = lesser(left, most);
     }
 
     /// Emits all events of one pixel, whose light changes linearly during the step, from `from_us` to its end. Returns the end of
@@ -359,16 +363,21 @@ fn subtract_from(slack: &[f32], changes: &mut [f32]) -> u128 {
     due
 }
 
-/// The least of whole blocks of values.
+/// The least value.
 #[inline(always)]
 fn least(values: &[f32]) -> f32 {
     let mut least = [f32::INFINITY; LANES];
-    for block in values.as_chunks::<LANES>().0 {
+    let (blocks, rest) = values.as_chunks::<LANES>();
+    for block in blocks {
         for k in 0..LANES {
             least[k] = lesser(least[k], block[k]);
         }
     }
-    least.into_iter().fold(f32::INFINITY, lesser)
+    least
+        .iter()
+        .chain(rest)
+        .copied()
+        .fold(f32::INFINITY, lesser)
 }
 
 /// Evaluates the blocks of a column whose slack is used up. Returns one bit per block: whether a pixel is beyond its event. A column
