@@ -40,6 +40,7 @@ mod states;
 mod stream_probe;
 pub mod suspend;
 mod touch;
+mod touch_progress;
 mod touch_sense;
 mod trigger_line;
 mod verdict;
@@ -58,6 +59,7 @@ pub use run::{Resume, Run, RunReport};
 pub use settings::ControllerSettings;
 pub use sink::RecordSink;
 pub use states::State;
+pub use touch_progress::TouchProgress;
 pub use touch_sense::{SenseAnswer, SenseFault, SensedTouch, TouchSense};
 pub use watchdog::{WatchLimits, Watchdog};
 

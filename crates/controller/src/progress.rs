@@ -8,6 +8,8 @@ use skinrig_model::{
     PulseTrain, RawChunk, Record, RunEnd, TriggerEdge, Verdict,
 };
 
+use crate::touch_progress::TouchProgress;
+
 /// Event rates are averages over this span of rig time.
 const RATE_SPAN: HostDuration = HostDuration::from_millis(1_000);
 
@@ -55,6 +57,8 @@ pub struct Progress {
     pub elapsed: HostDuration,
     /// Expected remaining rig time; `None` without an expected duration or after the end.
     pub eta: Option<HostDuration>,
+    /// What was felt; `None` until the run feels touches.
+    pub touch: Option<TouchProgress>,
     /// True between a pause and its end.
     pub paused: bool,
     /// End of the run, if it has ended.
@@ -148,6 +152,9 @@ impl ProgressTracker {
                 let known = self.verdicts.get(attempt.press.index() as usize);
                 p.retaken += usize::from(known.is_some_and(Option::is_some));
                 p.press = self.presses.get(attempt.press.index() as usize).copied();
+                if let (Some(touch), Some(press)) = (&mut p.touch, p.press) {
+                    touch.attempt(press.role);
+                }
                 self.reached(*t);
             }
             Record::Poses(block) => {
@@ -178,7 +185,10 @@ impl ProgressTracker {
             }
             Record::Preflight(_) | Record::Resumed(_) => {}
             Record::Command { t, .. } | Record::Note { t, .. } => self.reached(*t),
-            Record::Touch(estimate) => self.reached(estimate.t),
+            Record::Touch(estimate) => {
+                TouchProgress::add(&mut p.touch, *estimate);
+                self.reached(estimate.t);
+            }
             Record::Device { .. } | Record::Notification(_) => {}
         }
         &self.progress

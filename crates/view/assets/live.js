@@ -19,8 +19,9 @@ const shown = all => {
 };
 export const live = (name, about, view, signal) => {
   const alarms = el('div', { role: 'alert' }), state = el('p', { role: 'status' }), said = el('p', { role: 'status' });
+  const felt = el('p');
   const certificate = el('p'), notes = el('ul');
-  const card = el('section', { class: 'card', 'aria-label': 'Run' }, alarms, state, certificate, el('div', { class: 'transport' }, ask(about, name, said)), said, notes);
+  const card = el('section', { class: 'card', 'aria-label': 'Run' }, alarms, state, felt, certificate, el('div', { class: 'transport' }, ask(about, name, said)), said, notes);
   // Only the newest pictures are drawn, and none on a page that is not in sight.
   let newest = null;
   const draw = () => {
@@ -35,7 +36,10 @@ export const live = (name, about, view, signal) => {
       const r = run?.cameras?.map((c, k) => `camera ${k + 1} ${number((c.events_per_s ?? 0) / 1000, 1)} kev/s`).join(', ');
       state.textContent = run ? `${run.state}: ${run.done} of ${run.planned} presses; ${r}; to go ${number(run.eta_s, 0)} s; disk ${number((free ?? 0) / 1e9, 1)} GB free`
         : writer ? `written by ${writer}` : 'not running';
-      if (run?.tip_mm) view.tip(run.tip_mm);
+      const touch = run?.touch;
+      felt.textContent = touch ? `felt in ${touch.felt} of ${touch.presses} scored presses, ${touch.between} times between presses${touch.skipped ? `; ${touch.skipped} times too slow, bytes skipped` : ''}; ${
+        touch.touching ? `now${touch.at_mm ? ` at (${number(touch.at_mm[0], 1)}, ${number(touch.at_mm[1], 1)}) mm` : ''}${touch.region ? `, 95 % region ${number(touch.region.semi_axes_mm[0], 1)} x ${number(touch.region.semi_axes_mm[1], 1)} mm (semi-axes)` : ''}` : 'now nothing'}` : '';
+      if (run?.tip_mm) view.tip(run.tip_mm, touch?.touching && touch.at_mm ? touch : null);
     },
     presses: rows => view.presses(rows),
     pictures: all => { if (!newest) requestAnimationFrame(draw); newest = all; },

@@ -35,7 +35,7 @@ export const skinMap = (outline, cameras, choose) => {
       return dot;
     }));
   };
-  const mark = (press, tip) => {
+  const mark = (press, tip, touch) => {
     const parts = rays(press, cameras).map((ray, k) => ray && shape('line', { class: `ray c${k + 1}`, x1: ray[0], y1: -ray[1], x2: ray[2], y2: -ray[3] }));
     at = presses.indexOf(press);
     if (press) {
@@ -46,6 +46,11 @@ export const skinMap = (outline, cameras, choose) => {
         parts.push(shape('line', { class: 'miss', x1: x, y1: -y, x2: u, y2: -v }),
           shape('circle', { class: 'meeting', cx: u, cy: -v, r: 0.9 }, shape('title', {}, `rays meet ${number(press.error_mm)} mm from the press`)));
       }
+    }
+    if (touch) {
+      const [x, y] = touch.at_mm, { semi_axes_mm: [rx, ry], angle_deg: angle } = touch.region ?? { semi_axes_mm: [1, 1], angle_deg: 0 };
+      parts.push(shape('ellipse', { class: 'felt', cx: x, cy: -y, rx, ry, transform: `rotate(${-angle} ${x} ${-y})` },
+        shape('title', {}, touch.region ? 'felt here: 95 % region' : 'felt here, without a region')));
     }
     if (tip) parts.push(shape('circle', { class: 'tip', cx: tip[0], cy: -tip[1], r: 1.2 }));
     marks.replaceChildren(...parts.filter(Boolean));

@@ -22,7 +22,7 @@ export const session = async (named, about, signal) => {
   $('#sub').textContent = `${s.started_at}, ${fileName(s.protocol)}, ${s.rig} (${s.origin ?? 'origin unknown'})`;
   const card = s.writer ? live(named.session, about, {
     presses: it.presses, pictures: all => { if (!controls.isPlaying()) all.forEach((p, k) => it.pictures[k].counts(p)); },
-    tip: tip => { if (!controls.isPlaying()) it.map.mark(it.chosen(), tip); },
+    tip: (tip, touch) => { if (!controls.isPlaying()) it.map.mark(it.chosen(), tip, touch); },
   }, signal) : '';
   const first = it.first();
   if (!s.writer) { if (first) choose(first); else controls.draw(); }

@@ -17,7 +17,9 @@ mod wire;
 pub(crate) use board::Remote;
 pub(crate) use client::ask;
 pub(crate) use error::RemoteError;
-pub(crate) use wire::{MOST_NAME_CHARS, NewestEvents, Reply, Request, RunRequest, RunSnapshot};
+pub(crate) use wire::{
+    LiveTouch, MOST_NAME_CHARS, NewestEvents, Reply, Request, RunRequest, RunSnapshot,
+};
 
 /// This system has no Unix sockets.
 #[cfg(not(unix))]

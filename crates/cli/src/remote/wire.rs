@@ -4,8 +4,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
-use skinrig_controller::{Progress, State};
-use skinrig_model::CameraId;
+use skinrig_controller::{Progress, State, TouchProgress};
+use skinrig_model::{CameraId, TouchKind, TouchRegion};
 
 use super::newest::CameraTail;
 
@@ -132,6 +132,9 @@ pub(crate) struct RunSnapshot {
     pub waited_s: f64,
     /// Marks that the trigger box sent.
     pub marks_sent: u64,
+    /// What was felt; `None` until the run feels touches.
+    #[serde(default)]
+    pub touch: Option<LiveTouch>,
     /// Both cameras.
     pub cameras: [LiveCamera; 2],
 }
@@ -147,6 +150,49 @@ pub(crate) struct LivePress {
     pub repetition: u32,
     /// Its location, skin frame, mm.
     pub at_mm: [f64; 2],
+}
+
+/// What a run has felt, in a [`RunSnapshot`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct LiveTouch {
+    /// Whether a touch is being felt.
+    pub touching: bool,
+    /// The newest estimate or reaction,
+    pub kind: TouchKind,
+    /// when the run had it, s of rig time,
+    pub t_s: f64,
+    /// and how long after the newest events in it, ms.
+    pub lag_ms: f64,
+    /// Its position, skin frame, mm.
+    pub at_mm: Option<[f64; 2]>,
+    /// Its 95 % region.
+    pub region: Option<TouchRegion>,
+    /// Attempts at scored presses since the run feels touches.
+    pub presses: usize,
+    /// How many of them were felt.
+    pub felt: usize,
+    /// Touches felt between presses.
+    pub between: usize,
+    /// How often bytes were skipped because the estimator could not keep up.
+    pub skipped: usize,
+}
+
+impl LiveTouch {
+    fn of(touch: &TouchProgress) -> Self {
+        let latest = &touch.latest;
+        Self {
+            touching: touch.touching,
+            kind: latest.kind,
+            t_s: latest.t.as_secs_f64(),
+            lag_ms: (latest.t - latest.until).as_secs_f64() * 1e3,
+            at_mm: latest.at_mm,
+            region: latest.region,
+            presses: touch.presses,
+            felt: touch.felt,
+            between: touch.between,
+            skipped: touch.skipped,
+        }
+    }
 }
 
 /// A camera in a [`RunSnapshot`].
@@ -250,6 +296,7 @@ impl RunSnapshot {
             eta_s: p.eta.map(|t| t.as_secs_f64()),
             waited_s,
             marks_sent: p.marks_sent,
+            touch: p.touch.as_ref().map(LiveTouch::of),
             cameras: CameraId::ALL.map(|c| {
                 let camera = p.cameras[c.index()];
                 LiveCamera {

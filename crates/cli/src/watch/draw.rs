@@ -8,7 +8,7 @@ use super::failures::{CameraLoss, Failure};
 use super::frame::{Frame, LatestAttempt};
 use super::map::map;
 use crate::progress::{clock_text, eta_text};
-use crate::remote::RunSnapshot;
+use crate::remote::{LiveTouch, RunSnapshot};
 use crate::rig::gates;
 
 /// Number of causes shown.
@@ -188,6 +188,9 @@ fn of_run(live: &RunSnapshot, canvas: Canvas) -> Vec<String> {
         eta_text(elapsed, live.eta_s.map(seconds), waited)
     );
     lines.extend(canvas.line("time", None, &text));
+    if let Some(touch) = &live.touch {
+        lines.extend(canvas.line("felt", None, &felt(touch)));
+    }
     for (k, camera) in live.cameras.iter().enumerate() {
         let rate = camera.events_per_s.map(|r| format!("{:.1}", r / 1e3));
         let text = format!(
@@ -199,6 +202,30 @@ fn of_run(live: &RunSnapshot, canvas: Canvas) -> Vec<String> {
         lines.extend(canvas.line(&format!("camera {}", k + 1), None, &text));
     }
     lines
+}
+
+/// `12 of 14 scored presses, 1 touch between presses; now at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm`
+fn felt(touch: &LiveTouch) -> String {
+    let mut text = format!(
+        "{} of {} scored presses, {} touch{} between presses",
+        touch.felt,
+        touch.presses,
+        touch.between,
+        if touch.between == 1 { "" } else { "es" }
+    );
+    if touch.skipped > 0 {
+        text += &format!("; {} times too slow, bytes skipped", touch.skipped);
+    }
+    match touch.at_mm.filter(|_| touch.touching) {
+        Some([x, y]) => text += &format!("; now at ({x:.1}, {y:.1}) mm"),
+        None if touch.touching => text += "; now somewhere",
+        None => text += "; now nothing",
+    }
+    if let Some(region) = touch.region.filter(|_| touch.touching) {
+        let [long, short] = region.semi_axes_mm;
+        text += &format!(", 95 % region {long:.1} x {short:.1} mm (semi-axes)");
+    }
+    text
 }
 
 /// Invalid attempts by cause.
@@ -292,6 +319,7 @@ fn interruptions(frame: &Frame, canvas: Canvas) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use skinrig_model::{TouchKind, TouchRegion};
     use skinrig_text::width;
 
     use super::*;
@@ -308,6 +336,34 @@ mod tests {
         );
         assert!(lines[1].starts_with("         "));
         assert!(!lines.concat().contains('\u{1b}'));
+    }
+
+    #[test]
+    fn what_is_felt_is_described_with_its_region() {
+        let mut touch = LiveTouch {
+            touching: true,
+            kind: TouchKind::Position,
+            t_s: 12.0,
+            lag_ms: 4.0,
+            at_mm: Some([8.06, -2.0]),
+            region: Some(TouchRegion {
+                semi_axes_mm: [3.1, 2.0],
+                angle_deg: 30.0,
+            }),
+            presses: 14,
+            felt: 12,
+            between: 1,
+            skipped: 0,
+        };
+        assert_eq!(
+            felt(&touch),
+            "12 of 14 scored presses, 1 touch between presses; now at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm (semi-axes)"
+        );
+        (touch.touching, touch.between, touch.skipped) = (false, 0, 2);
+        assert_eq!(
+            felt(&touch),
+            "12 of 14 scored presses, 0 touches between presses; 2 times too slow, bytes skipped; now nothing"
+        );
     }
 
     #[test]
