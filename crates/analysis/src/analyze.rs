@@ -158,7 +158,9 @@ fn analyze_by(
         input.settings.seed,
     );
     let depths = scores.depths_mm();
-    let depths = if depths.len() > 1 { depths } else { Vec::new() };
+    let mut depths = if depths.len() > 1 { depths } else { Vec::new() };
+    let unreached = input.unreached_depths_mm();
+    depths.retain(|depth_mm| !unreached.contains(depth_mm));
     let depths = depths.into_iter().map(|depth_mm| DepthResult {
         depth_mm,
         rmse_mm: measure(&scores.at_depth(depth_mm), Exclusions::Applied).rmse_mm,

@@ -1,8 +1,10 @@
 //! Owns the input of an analysis: plain values and one event source.
 
+use std::collections::HashSet;
+
 use skinrig_model::{
     AnalysisSettings, BoxReport, CameraId, CdEvent, HostTime, PlannedPress, PressId, PressOutcome,
-    RigGeometry, SentMark, TriggerEdge,
+    PressRole, RigGeometry, SentMark, TriggerEdge,
 };
 
 use crate::leg::LegStart;
@@ -87,6 +89,19 @@ pub struct SessionInput {
     pub rig: RigGeometry,
     /// The settings.
     pub settings: AnalysisSettings,
+}
+
+impl SessionInput {
+    /// Planned depths, mm, that not every scored press reached, because some stopped when they were felt. The others are no sample of
+    /// that depth: they were the ones hard to feel.
+    pub(crate) fn unreached_depths_mm(&self) -> Vec<f64> {
+        let stopped: HashSet<PressId> = self.stopped.iter().copied().collect();
+        let scored = self.planned.iter().filter(|p| p.role == PressRole::Score);
+        scored
+            .filter(|p| stopped.contains(&p.id))
+            .map(|p| p.depth_mm)
+            .collect()
+    }
 }
 
 /// Why a source could not deliver all events: the source's own error.

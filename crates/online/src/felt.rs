@@ -3,7 +3,9 @@
 use skinrig_analysis::Analysis;
 use skinrig_analysis::metrics::quantile;
 use skinrig_analysis::result::{FeltReactions, FeltTouches, PressResult, Region, Spread};
-use skinrig_model::{HostTime, PressId, Reaction, TouchEstimate, TouchKind, TouchRegion};
+use skinrig_model::{
+    AttemptId, HostTime, PressId, PressOutcome, Reaction, TouchEstimate, TouchKind, TouchRegion,
+};
 
 use crate::detector::{Detection, Felt};
 use crate::score::{DetectionScore, ScoredPress};
@@ -103,17 +105,17 @@ impl<'a> Sensed<'a> {
     }
 }
 
-/// Compares `touches`, in the order of the record, with the analysis of the session, of which `depth_mm` gives the measured depths;
-/// `None` if nothing was ever felt in it. Nothing is felt from `resumed` on, the start of the second leg.
+/// Compares `touches`, in the order of the record, with the analysis of the session, of which `outcome` gives the last attempts; `None`
+/// if nothing was ever felt in it. Nothing is felt from `resumed` on, the start of the second leg.
 #[must_use]
-pub fn felt(
+pub fn felt<'o>(
     analysis: &Analysis,
     touches: &[TouchEstimate],
     resumed: Option<HostTime>,
-    depth_mm: impl Fn(PressId) -> Option<f64>,
+    outcome: impl Fn(PressId) -> Option<&'o PressOutcome>,
 ) -> Option<FeltTouches> {
     let from = touches.iter().find(|t| t.kind == TouchKind::Started)?.t;
-    let all = ScoredPress::carried_out(analysis);
+    let all = ScoredPress::of(analysis);
     let until_us = resumed.map_or(f64::INFINITY, us);
     let (presses, outside): (Vec<ScoredPress>, Vec<ScoredPress>) = all
         .into_iter()
@@ -152,12 +154,22 @@ pub fn felt(
         region_mm: spread(last().filter_map(|(_, t)| Some(t.region?.semi_axes_mm[0]))),
         with_regions: held.len() as u32,
         held: held.iter().filter(|held| **held).count() as u32,
-        reactions: reactions(analysis, &presses, touches, depth_mm),
+        reactions: reactions(analysis, &presses, touches, outcome),
         skipped: touches
             .iter()
             .filter(|t| t.kind == TouchKind::Skipped)
             .count() as u32,
     })
+}
+
+/// How an attempt reacted.
+fn reaction_of(
+    touches: &[TouchEstimate],
+    reaction: Reaction,
+    attempt: AttemptId,
+) -> Option<&TouchEstimate> {
+    let own = |t: &&TouchEstimate| t.kind == reaction.kind() && t.attempt == Some(attempt);
+    touches.iter().rfind(own)
 }
 
 const fn is_of_events(kind: TouchKind) -> bool {
@@ -167,11 +179,11 @@ const fn is_of_events(kind: TouchKind) -> bool {
     )
 }
 
-fn reactions(
+fn reactions<'o>(
     analysis: &Analysis,
     presses: &[ScoredPress],
     touches: &[TouchEstimate],
-    depth_mm: impl Fn(PressId) -> Option<f64>,
+    outcome: impl Fn(PressId) -> Option<&'o PressOutcome>,
 ) -> Option<FeltReactions> {
     let reaction = touches.iter().find_map(|t| match t.kind {
         TouchKind::Stopped => Some(Reaction::Stop),
@@ -180,11 +192,10 @@ fn reactions(
     })?;
     let of_press = |scored: &ScoredPress| {
         let press = &analysis.presses[scored.row];
-        let own = |t: &&TouchEstimate| {
-            t.kind == reaction.kind() && t.attempt.is_some_and(|a| a.press == press.press)
-        };
-        // The last attempt is the one that counts.
-        Some((press, scored.contact_us, touches.iter().rfind(own)?))
+        // The last attempt is the one that counts; an earlier one may have reacted where it did not.
+        let counted = outcome(press.press)?.attempt;
+        let own = reaction_of(touches, reaction, counted)?;
+        Some((press, scored.contact_us, own))
     };
     let all: Vec<_> = presses.iter().filter_map(of_press).collect();
     let late_ms =
@@ -197,7 +208,10 @@ fn reactions(
         reaction,
         reaction_ms: spread(all.iter().map(late_ms)),
         since_event_ms: spread(all.iter().map(|(_, _, t)| (us(t.t) - us(t.until)) * 1e-3)),
-        depth_mm: spread(all.iter().filter_map(|(press, ..)| depth_mm(press.press))),
+        depth_mm: spread(
+            all.iter()
+                .filter_map(|(press, ..)| outcome(press.press)?.measured_depth_mm),
+        ),
         early: all
             .iter()
             .filter(|a| late_ms(a) < 0.0)
@@ -208,4 +222,31 @@ fn reactions(
             inside.iter().filter(|is| **is).count() as u32,
         ),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A retaken press that was not felt again went to its depth, and did not react.
+    #[test]
+    fn the_reaction_of_an_earlier_attempt_is_none_of_the_last() {
+        let attempt = |number| AttemptId {
+            press: PressId::from_index(4),
+            number,
+        };
+        let stopped = TouchEstimate {
+            t: HostTime(2_000_000),
+            until: HostTime(1_000_000),
+            until_sd_ns: 0,
+            kind: TouchKind::Stopped,
+            attempt: Some(attempt(1)),
+            at_mm: None,
+            region: None,
+            llr: None,
+        };
+        let of = |number| reaction_of(&[stopped], Reaction::Stop, attempt(number)).copied();
+        assert_eq!(of(1), Some(stopped));
+        assert_eq!(of(2), None);
+    }
 }

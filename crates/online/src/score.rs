@@ -25,21 +25,10 @@ pub struct ScoredPress {
 }
 
 impl ScoredPress {
-    /// The valid scored presses of an analysis that follow another press.
+    /// The scored presses of an analysis that were carried out and follow another press; also those excluded for what the cameras saw:
+    /// a press that was carried out and not felt is missed.
     #[must_use]
     pub fn of(analysis: &Analysis) -> Vec<Self> {
-        Self::chosen(analysis, |verdict| verdict == Verdict::Valid)
-    }
-
-    /// The same with those that were excluded for what the cameras saw: a press that was carried out and not felt is missed.
-    #[must_use]
-    pub(crate) fn carried_out(analysis: &Analysis) -> Vec<Self> {
-        Self::chosen(analysis, |verdict| {
-            matches!(verdict, Verdict::Valid | Verdict::Excluded)
-        })
-    }
-
-    fn chosen(analysis: &Analysis, counts: impl Fn(Verdict) -> bool) -> Vec<Self> {
         let us = |t: HostTime| t.0 as f64 * 1e-3;
         let mut timed: Vec<_> = analysis
             .presses
@@ -50,7 +39,7 @@ impl ScoredPress {
         timed.sort_by_key(|(_, _, timing)| timing.contact);
         let pairs = timed.windows(2).map(|pair| (pair[0].2, pair[1]));
         pairs
-            .filter(|(_, (_, p, _))| p.role == PressRole::Score && counts(p.verdict))
+            .filter(|(_, (_, p, _))| p.role == PressRole::Score && is_carried_out(p.verdict))
             .map(|(before, (row, _, timing))| Self {
                 row,
                 contact_us: us(timing.contact),
@@ -63,6 +52,11 @@ impl ScoredPress {
     fn contact_from_us(&self) -> f64 {
         self.contact_us - CONTACT_US
     }
+}
+
+/// True for a press that the robot made, whether or not the cameras saw it well enough to count.
+const fn is_carried_out(verdict: Verdict) -> bool {
+    matches!(verdict, Verdict::Valid | Verdict::Excluded)
 }
 
 /// The result.
@@ -141,6 +135,17 @@ mod tests {
             llr: 20.0,
             near_mm: [0.0, 0.0],
         }
+    }
+
+    #[test]
+    fn a_press_that_the_cameras_hardly_saw_counts() {
+        let all = [
+            Verdict::Valid,
+            Verdict::Excluded,
+            Verdict::Invalid,
+            Verdict::Missed,
+        ];
+        assert_eq!(all.map(is_carried_out), [true, true, false, false]);
     }
 
     #[test]

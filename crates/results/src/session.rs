@@ -1,9 +1,12 @@
 //! Owns an open session: header, rig, and analysis settings.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{EarlierAttempt, LegStart, SessionInput};
-use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader, TouchKind, TriggerEdge};
+use skinrig_model::{
+    AnalysisSettings, AttemptId, CameraId, RigGeometry, RunHeader, TouchKind, TriggerEdge,
+};
 use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 
 use crate::contacts;
@@ -77,8 +80,10 @@ impl Session {
         let reports = reader.box_reports()?.into_iter();
         let touches = reader.touches()?.into_iter();
         let stopped = touches.filter(|t| t.kind == TouchKind::Stopped);
+        let counted: BTreeSet<AttemptId> = outcomes.iter().flatten().map(|o| o.attempt).collect();
+        let stopped = stopped.filter_map(|t| t.attempt.filter(|attempt| counted.contains(attempt)));
         Ok(SessionInput {
-            stopped: stopped.filter_map(|t| Some(t.attempt?.press)).collect(),
+            stopped: stopped.map(|attempt| attempt.press).collect(),
             planned,
             outcomes,
             earlier,

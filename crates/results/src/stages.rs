@@ -9,7 +9,7 @@ use skinrig_analysis::result::{Motion, PressResult, Warning, WarningCause};
 use skinrig_analysis::{
     Analysis, LegStart, Retention, SessionInput, analyze_recalibrated, analyze_with_events, legs,
 };
-use skinrig_model::{HostTime, PressId, Reaction};
+use skinrig_model::{HostTime, PressId, PressOutcome, Reaction};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::campaign;
@@ -99,12 +99,12 @@ impl AlignedSession {
         let motion = motion(&self.session.reader, &analysis)?;
         let touches = self.session.reader.touches()?;
         let rows = self.input.planned.iter().zip(&self.input.outcomes);
-        let depths: BTreeMap<PressId, f64> = rows
-            .filter_map(|(press, outcome)| Some((press.id, outcome.as_ref()?.measured_depth_mm?)))
+        let outcomes: BTreeMap<PressId, &PressOutcome> = rows
+            .filter_map(|(press, outcome)| Some((press.id, outcome.as_ref()?)))
             .collect();
         let resumed = self.input.legs.first().map(|leg| leg.origin);
         let felt = skinrig_online::felt(&analysis, &touches, resumed, |press| {
-            depths.get(&press).copied()
+            outcomes.get(&press).copied()
         });
         let end = self.session.reader.end()?.map(|(_, end)| end);
         let plan_json = &self.session.header.plan_json;

@@ -221,6 +221,15 @@ fn several_depths_are_also_scored_one_by_one() {
         .sum();
     let pooled = (squares / f64::from(a.scored.rmse_mm.n)).sqrt();
     assert!((pooled - a.scored.rmse_mm.value.unwrap()).abs() < 1e-9);
+
+    // One press that stopped when it was felt: the others are no sample of its depth.
+    let shallow =
+        |p: &&skinrig_model::PlannedPress| p.role == PressRole::Score && p.depth_mm == 1.0;
+    let stopped = input.planned.iter().find(shallow).unwrap().id;
+    input.stopped = vec![stopped];
+    let b = analyze(&input, &source).unwrap();
+    assert_eq!(b.depths, a.depths[1..]);
+    assert_eq!(b.scored, a.scored);
 }
 
 /// Parts of the session as long as a repetition or a multiple of it would show the same place again and again.

@@ -15,10 +15,11 @@ pub(super) struct Row {
     pub measured: f64,
 }
 
-/// Errors at scored presses and at left-out locations.
+/// Errors at scored presses and at left-out locations. Of scored presses, those at `unreached` depths have none by depth.
 pub(super) fn quantity(
     scored: &[Row],
     left_out: &[Row],
+    unreached: &[f64],
     taught_by: u32,
     settings: &AnalysisSettings,
 ) -> Quantity {
@@ -33,9 +34,13 @@ pub(super) fn quantity(
             .collect();
         errors(&own, settings)
     };
+    let reached = |depth_mm: f64| match unreached.contains(&depth_mm) {
+        true => &[],
+        false => scored,
+    };
     let each = depths.into_iter().map(|depth_mm| QuantityAtDepth {
         depth_mm,
-        scored: at(scored, depth_mm),
+        scored: at(reached(depth_mm), depth_mm),
         left_out: at(left_out, depth_mm),
     });
     Quantity {
@@ -64,5 +69,33 @@ fn errors(rows: &[Row], settings: &AnalysisSettings) -> QuantityErrors {
         bias: numbers(&error, mean_over_locations),
         relative_percent: numbers(&|r| 100.0 * error(r) / r.measured, rms_over_locations),
         covered: share_over_locations(&inside, settings.bootstrap_resamples, settings.seed),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_depth_that_was_not_reached_has_no_errors_of_its_own() {
+        let row = |location, depth_mm: f64| Row {
+            location,
+            depth_mm,
+            estimate: Ranged {
+                value: 0.5,
+                interval: None,
+            },
+            measured: 0.4,
+        };
+        let rows: Vec<Row> = (0..8).flat_map(|k| [row(k, 1.0), row(k, 2.0)]).collect();
+        let found = quantity(&rows, &rows, &[2.0], 8, &AnalysisSettings::default());
+        let n = |q: &QuantityErrors| q.rmse.n;
+        let by_depth: Vec<_> = found
+            .depths
+            .iter()
+            .map(|d| (n(&d.scored), n(&d.left_out)))
+            .collect();
+        assert_eq!(by_depth, [(8, 8), (0, 8)]);
+        assert_eq!(n(&found.scored), 16);
     }
 }

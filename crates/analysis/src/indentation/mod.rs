@@ -209,7 +209,13 @@ fn summary(
         .collect();
     let taught_by = teachers.len() as u32;
     (
-        Some(quantity(&scored, &left_out, taught_by, &input.settings)),
+        Some(quantity(
+            &scored,
+            &left_out,
+            &input.unreached_depths_mm(),
+            taught_by,
+            &input.settings,
+        )),
         None,
     )
 }

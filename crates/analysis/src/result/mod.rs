@@ -142,7 +142,7 @@ pub struct Analysis {
     /// Ignored events outside the sensor, camera 1 and camera 2.
     #[serde(default)]
     pub off_sensor: [OffSensor; 2],
-    /// RMSE of the scored presses at each depth, shallowest first; empty for a single depth.
+    /// RMSE of the scored presses at each depth that all of them reached, shallowest first; empty for a single depth.
     pub depths: Vec<DepthResult>,
     /// Event rates of each camera over the whole session.
     #[serde(default)]

@@ -199,6 +199,12 @@ fn print(skin: &SkinModel, stop: StopRule, felts: &Felts, replay: &Replay, rig: 
         felts.missed,
         felts.alarmed
     );
+    if felts.outside > 0 {
+        outln!(
+            "outside   {} more after the end of a camera's data",
+            felts.outside
+        );
+    }
     let (delay, release) = (felts.delay_ms, felts.release_ms);
     outln!(
         "delay     median {} ms, p99 {} ms after measured contact",

@@ -68,7 +68,10 @@ pub(super) struct At {
 /// Result of a replay.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Felts {
+    /// Scored presses that were carried out and follow another one, excluded or not,
     pub(super) presses: usize,
+    /// and those after the end of a camera's data.
+    pub(super) outside: usize,
     pub(super) felt: usize,
     pub(super) missed: usize,
     pub(super) alarmed: usize,
@@ -92,10 +95,9 @@ impl Felts {
         stop: StopRule,
         until_us: i64,
     ) -> Self {
-        let presses: Vec<ScoredPress> = ScoredPress::of(analysis)
+        let (presses, outside): (Vec<ScoredPress>, Vec<ScoredPress>) = ScoredPress::of(analysis)
             .into_iter()
-            .filter(|p| p.release_us + 100e3 < until_us as f64)
-            .collect();
+            .partition(|p| p.release_us + 100e3 < until_us as f64);
         let score = DetectionScore::new(found, &presses);
         let of_press = |press: &ScoredPress| {
             let range = press.contact_us - 1e3..press.release_us;
@@ -113,6 +115,7 @@ impl Felts {
         let last = |s: &[Sighting]| s.iter().rfind(|s| s.position.location.is_some()).copied();
         Self {
             presses: presses.len(),
+            outside: outside.len(),
             felt: score.delays_ms.len(),
             missed: score.missed,
             alarmed: score.alarmed,

@@ -134,14 +134,14 @@ fn felt_notes(f: &FeltTouches) -> Vec<String> {
             number(Some(f.from_s), 0)
         ));
     }
-    notes.push(if f.with_regions > 0 {
-        format!(
+    if f.with_regions > 0 {
+        notes.push(format!(
             "The regions hold at every instant in {} of {} touches; at least 95 % are stated.",
             f.held, f.with_regions
-        )
-    } else {
-        "No regions: the calibration presses are too few.".to_owned()
-    });
+        ));
+    } else if f.error_mm.n > 0 {
+        notes.push("No regions: the calibration presses are too few.".to_owned());
+    }
     if let Some(r) = &f.reactions {
         let what = match r.reaction {
             Reaction::Stop => "stopped where they were",
