@@ -1,6 +1,7 @@
 //! What a crate holds beside bundles and results, and what it states: `publish` writes it, `reproduce` derives it again.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use skinrig_export::{CrateDescription, CrateNumber, CrateOrganisation, CratePerson};
 use skinrig_protocol::publication::{Organisation, Person};
@@ -8,14 +9,23 @@ use skinrig_protocol::{Publication, Selection};
 
 use super::card::{Published, card};
 use super::headline::{self, Headline, Number};
-use super::{ABOUT, SELECTED, file_name};
 use crate::exit::Failure;
 
+/// Folder of the results with the selection.
+pub(super) const SELECTED: &str = "selected";
+/// The file of `--about` in a crate.
+pub(super) const ABOUT: &str = "publication.yaml";
 /// File of the data card.
 const CARD: &str = "README.md";
 
 /// Derives the numbers again.
 const SCRIPT: &str = "#!/bin/sh\n# Compares every file with its checksum and derives every number again.\nexec skinrig reproduce \"$(dirname \"$0\")\" \"$@\"\n";
+
+/// Name of a file without its folders.
+pub(super) fn file_name(path: &str) -> String {
+    let name = Path::new(path).file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
 
 /// The file of a session's protocol.
 pub(super) fn protocol_file(bundle: &str) -> String {

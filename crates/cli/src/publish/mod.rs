@@ -16,7 +16,7 @@ use skinrig_protocol::{Publication, Selection};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use self::card::Published;
-use self::documents::{description, documents, protocol_file};
+use self::documents::{ABOUT, SELECTED, description, documents, file_name, protocol_file};
 use self::headline::{FORMAT, Headline, Number, SelectionEntry, SessionNumbers};
 use crate::args::PublishArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -28,11 +28,6 @@ use crate::version::SOFTWARE;
 use crate::{analyses, provenance, signature};
 
 pub(crate) use self::reproduce::reproduce;
-
-/// Folder of the results with the selection.
-const SELECTED: &str = "selected";
-/// The file of `--about` in a crate.
-const ABOUT: &str = "publication.yaml";
 
 /// Writes the crate.
 ///
@@ -194,11 +189,6 @@ fn names_in(folder: &Path) -> Result<Vec<String>, Failure> {
     }
     found.sort();
     Ok(found)
-}
-
-fn file_name(path: &str) -> String {
-    let name = Path::new(path).file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
 }
 
 fn entry(selection: &Selection) -> SelectionEntry {

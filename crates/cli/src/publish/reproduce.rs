@@ -11,9 +11,9 @@ use skinrig_recorder::SessionReader;
 
 use super::card::Published;
 use super::checks::{Check, Checks};
-use super::documents::{description, documents};
+use super::documents::{ABOUT, SELECTED, description, documents};
 use super::headline::{FILE, FORMAT, Headline, SessionNumbers};
-use super::{ABOUT, SELECTED, described, selected_folder, with_selection};
+use super::{described, selected_folder, with_selection};
 use crate::args::ReproduceArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::selection::{self, SelectedPresses};
