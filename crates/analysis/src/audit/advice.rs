@@ -64,7 +64,7 @@ pub(super) const fn of(fault: Fault) -> &'static str {
         }
         Fault::HeightOff => {
             "either may be off, and the cameras cannot tell which. On the bench, `skinrig hil run hil/nightly.yaml \
-             --rig NAME.yaml --only depth` presses_seen the surface: if it FAILs, calibrate the robot and touch off the \
+             --rig NAME.yaml --only depth` finds the surface: if it FAILs, calibrate the robot and touch off the \
              frame again (`skinrig jog --rig NAME.yaml`); if it PASSes, correct the skin frame in the protocol, or \
              check what was mounted for this run. Poses with late timestamps also make events appear early"
         }
@@ -82,7 +82,8 @@ pub(super) const fn of(fault: Fault) -> &'static str {
             "check that skin, cameras and light are fixed; analyse the repetitions separately"
         }
         Fault::Unknown => {
-            "look at the images and centroid tracks; the nominal camera geometry may be wrong"
+            "if a warning says that noise joins the clusters, analyse with the `min_samples` that it names; else look at the images \
+             and centroid tracks: the nominal camera geometry may be wrong"
         }
     }
 }

@@ -228,8 +228,8 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
         (
             json!({"camera": "camera2", "kind": "dense_background", "neighbours": 8.26, "eps_px": 10.0,
                 "min_samples": 10, "advised_min_samples": 21.0}),
-            "camera 2: in a press window the background alone puts 8.3 events within eps (10 px) of an event, and 10 \
-             make a cluster (min_samples), so noise joins the clusters; a min_samples of 21 prevents this",
+            "camera 2: noise joins the clusters; `--set analysis.min_samples=21` prevents this: in a press window the background \
+             alone puts 8.3 events within eps (10 px) of an event, and 10 make a cluster",
         ),
         (
             json!({"kind": "no_scored_press"}),

@@ -193,9 +193,8 @@ pub enum WarningCause {
     },
     /// The background alone makes clusters.
     #[error(
-        "in a press window the background alone puts {neighbours:.1} events within eps ({eps_px} px) of an event, and \
-         {min_samples} make a cluster (min_samples), so noise joins the clusters; a min_samples of \
-         {advised_min_samples} prevents this"
+        "noise joins the clusters; `--set analysis.min_samples={advised_min_samples}` prevents this: in a press window the background \
+         alone puts {neighbours:.1} events within eps ({eps_px} px) of an event, and {min_samples} make a cluster"
     )]
     DenseBackground {
         /// Events of the background expected in a neighbourhood.
