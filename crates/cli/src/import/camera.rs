@@ -25,6 +25,8 @@ const CHUNK_SPAN_US: u64 = 400_000;
 const QUEUE: usize = 4;
 /// A camera may have been started this long after the schedule's begin, µs; its file then ends as much earlier.
 const LATE_START_US: u64 = 60_000_000;
+/// A camera may go on for as long again as the schedule, or for this long, µs, after the last press.
+const LATE_END_US: u64 = 3_600_000_000;
 /// Time words of encoded streams come this often, µs: the sparsest that EVT2 allows, because a container without
 /// time words gives no reason for more.
 const TIME_HIGH_EVERY_US: u64 = 64;
@@ -239,6 +241,9 @@ impl FileCamera {
                 (Some(until), Some(last)) => last.saturating_sub(base_us) <= until,
                 _ => true,
             };
+            if until_us.is_none() {
+                self.check_end(facts.last_us.map_or(0, |last| last.saturating_sub(base_us)))?;
+            }
             if !due {
                 self.waiting = Some((bytes, facts, triggers));
                 return Ok(());
@@ -258,6 +263,21 @@ impl FileCamera {
             });
             self.seq += 1;
         }
+    }
+
+    /// Called after the last press: an error if the recording, which has `reached_us` by now, goes on and on. Its times then have
+    /// another unit, and to encode days of an idle camera would fill the memory.
+    fn check_end(&self, reached_us: u64) -> Result<(), DeviceError> {
+        let now_us = u64::try_from(self.clock.now().0 / 1_000).unwrap_or(0);
+        if reached_us <= now_us + now_us.max(LATE_END_US) {
+            return Ok(());
+        }
+        Err(self.lost(format!(
+            "the recording goes on for more than {:.0} s after the schedule's end at {:.0} s: expected a recording as long as its \
+             schedule; are its times in the unit of the format, and is it the schedule of this recording?",
+            now_us.max(LATE_END_US) as f64 * 1e-6,
+            now_us as f64 * 1e-6
+        )))
     }
 
     /// Called at the end of the file: an error if the schedule continues long after it.
