@@ -12,6 +12,12 @@ const ask = (about, name, said) => !about.control ? [] : [
   } }, el('label', {}, 'Your name ', el('input', { type: 'text', name: 'by', required: true, maxlength: 64 })), ' ',
   el('label', {}, 'Note ', el('input', { type: 'text', name: 'text', required: true, maxlength: 2000 })), ' ', el('button', { type: 'submit' }, 'Add note')),
 ];
+// What a run feels, in words.
+const feeling = t => [`felt: ${t.felt} of ${t.presses} scored presses, ${t.between} touch${t.between === 1 ? '' : 'es'} between presses`,
+  t.skipped && `skipped bytes ${t.skipped} times to keep up`,
+  !t.touching ? 'not touched now' : ['touched now', t.at_mm && `at (${t.at_mm.map(v => number(v, 1)).join(', ')}) mm`,
+    t.region && `95 % region ${t.region.semi_axes_mm.map(v => number(v, 1)).join(' x ')} mm (semi-axes)`].filter(Boolean).join(', '),
+].filter(Boolean).join('; ');
 // A mark in the browser's own timeline: the pictures taken then are on the screen now.
 const shown = all => {
   performance.clearMarks('pictures');
@@ -37,8 +43,7 @@ export const live = (name, about, view, signal) => {
       state.textContent = run ? `${run.state}: ${run.done} of ${run.planned} presses; ${r}; to go ${number(run.eta_s, 0)} s; disk ${number((free ?? 0) / 1e9, 1)} GB free`
         : writer ? `written by ${writer}` : 'not running';
       const touch = run?.touch;
-      felt.textContent = touch ? `felt in ${touch.felt} of ${touch.presses} scored presses, ${touch.between} times between presses${touch.skipped ? `; ${touch.skipped} times too slow, bytes skipped` : ''}; ${
-        touch.touching ? `now${touch.at_mm ? ` at (${number(touch.at_mm[0], 1)}, ${number(touch.at_mm[1], 1)}) mm` : ''}${touch.region ? `, 95 % region ${number(touch.region.semi_axes_mm[0], 1)} x ${number(touch.region.semi_axes_mm[1], 1)} mm (semi-axes)` : ''}` : 'now nothing'}` : '';
+      felt.textContent = touch ? feeling(touch) : '';
       if (run?.tip_mm) view.tip(run.tip_mm, touch?.touching && touch.at_mm ? touch : null);
     },
     presses: rows => view.presses(rows),

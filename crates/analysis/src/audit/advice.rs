@@ -82,8 +82,7 @@ pub(super) const fn of(fault: Fault) -> &'static str {
             "check that skin, cameras and light are fixed; analyse the repetitions separately"
         }
         Fault::Unknown => {
-            "if a warning says that noise joins the clusters, analyse with the `min_samples` that it names; else look at the images \
-             and centroid tracks: the nominal camera geometry may be wrong"
+            "if a warning asks for it, raise `min_samples`; else look at the images: the nominal camera geometry may be wrong"
         }
     }
 }

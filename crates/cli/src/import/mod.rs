@@ -11,7 +11,7 @@ use std::io::Read;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use skinrig_controller::RunFault;
+use skinrig_controller::{Problem, RunFault};
 use skinrig_device::{CameraSettings, Rig};
 use skinrig_formats::Geometry;
 use skinrig_formats::hdf5::Container;
@@ -129,7 +129,20 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
         .faults()
         .iter()
         .any(|c| matches!(c, RunFault::Device(_)));
-    conclude(&session, &report, args.no_analysis, None, output).map_err(|failure| {
+    let concluded = conclude(&session, &report, args.no_analysis, None, output);
+    let is_of_a_file = |p: &&Problem| matches!(p.error, RunFault::Device(_));
+    if let (false, Some(problem)) = (unreadable, report.problems.iter().find(is_of_a_file)) {
+        // All presses have what they need, but a file was not read to its end.
+        if let Err(failure) = concluded {
+            errln!("{}", failure.message);
+        }
+        return Err(Failure::input(format!(
+            "{}\n  everything read so far is kept: {}\n  next: mend the file, or cut it where the schedule ends, and import again",
+            problem.error,
+            session.display()
+        )));
+    }
+    concluded.map_err(|failure| {
         // An import uses no rig: a camera error means that its file is damaged or too short.
         if unreadable {
             Failure {

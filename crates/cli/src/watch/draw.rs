@@ -204,7 +204,7 @@ fn of_run(live: &RunSnapshot, canvas: Canvas) -> Vec<String> {
     lines
 }
 
-/// `12 of 14 scored presses, 1 touch between presses; now at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm`
+/// `12 of 14 scored presses, 1 touch between presses; touched now, at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm (semi-axes)`
 fn felt(touch: &LiveTouch) -> String {
     let mut text = format!(
         "{} of {} scored presses, {} touch{} between presses",
@@ -214,12 +214,12 @@ fn felt(touch: &LiveTouch) -> String {
         if touch.between == 1 { "" } else { "es" }
     );
     if touch.skipped > 0 {
-        text += &format!("; {} times too slow, bytes skipped", touch.skipped);
+        text += &format!("; skipped bytes {} times to keep up", touch.skipped);
     }
     match touch.at_mm.filter(|_| touch.touching) {
-        Some([x, y]) => text += &format!("; now at ({x:.1}, {y:.1}) mm"),
-        None if touch.touching => text += "; now somewhere",
-        None => text += "; now nothing",
+        Some([x, y]) => text += &format!("; touched now, at ({x:.1}, {y:.1}) mm"),
+        None if touch.touching => text += "; touched now",
+        None => text += "; not touched now",
     }
     if let Some(region) = touch.region.filter(|_| touch.touching) {
         let [long, short] = region.semi_axes_mm;
@@ -357,12 +357,12 @@ mod tests {
         };
         assert_eq!(
             felt(&touch),
-            "12 of 14 scored presses, 1 touch between presses; now at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm (semi-axes)"
+            "12 of 14 scored presses, 1 touch between presses; touched now, at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm (semi-axes)"
         );
         (touch.touching, touch.between, touch.skipped) = (false, 0, 2);
         assert_eq!(
             felt(&touch),
-            "12 of 14 scored presses, 0 touches between presses; 2 times too slow, bytes skipped; now nothing"
+            "12 of 14 scored presses, 0 touches between presses; skipped bytes 2 times to keep up; not touched now"
         );
     }
 

@@ -132,6 +132,19 @@ fn nan_times_and_times_that_go_back_are_rejected() {
 }
 
 #[test]
+fn a_recording_that_goes_on_for_days_is_not_read_to_its_end() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let last = events(CameraId::Two).len() - 1;
+    patch(&data.cameras[1], &stored_time(last), &1e6_f64.to_le_bytes());
+    // All presses are there, but the file is not read to its end.
+    let output = skinrig(&data.arguments(&lab.path("s"))).code(2);
+    for part in ["camera2.hdf5", "goes on", "unit of the format", "kept"] {
+        assert!(output.err.contains(part), "{part}: {output:?}");
+    }
+}
+
+#[test]
 fn positions_that_do_not_fit() {
     let lab = Lab::new();
     let data = Dataset::new(&lab);
