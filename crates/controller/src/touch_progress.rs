@@ -104,13 +104,8 @@ mod tests {
     #[test]
     fn felt_presses_touches_between_them_and_withdrawn_ones_are_counted() {
         let mut all = None;
-        let mut add = |kind, press| {
-            TouchProgress::add(&mut all, estimate(kind, press));
-            all.unwrap()
-        };
-        let start = add(TouchKind::Started, None);
-        assert!(!start.touching);
-        let mut all = Some(start);
+        TouchProgress::add(&mut all, estimate(TouchKind::Started, None));
+        assert!(all.is_some_and(|start| !start.touching));
         let mut add = |role: Option<PressRole>, kind, press| {
             if let Some(role) = role {
                 all.as_mut().unwrap().attempt(role);
