@@ -77,8 +77,9 @@ use crate::rule::Rule;
 /// and evidence are. Version 11: depth and force are estimated. Version 12: the fields of the locators
 /// end their search where the likelihood gains less than 0.001. Version 13: calibrations and located
 /// positions have at least nine correct digits where the problem is well posed. Version 14: so have held-out errors; the
-/// estimated depth treats ON and OFF alike, and intervals are wider for few locations.
-pub const ANALYSIS_VERSION: u32 = 15;
+/// estimated depth treats ON and OFF alike, and intervals are wider for few locations. Version 16: a depth that presses stopped short of has no
+/// errors of its own.
+pub const ANALYSIS_VERSION: u32 = 16;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
