@@ -31,6 +31,7 @@ fn view(column: f64) -> PressView {
         spread_u: None,
         spread_v: None,
         width_u: None,
+        core_threshold: None,
     }
 }
 

@@ -127,6 +127,8 @@ pub(crate) struct EventCounts {
     pub on: u32,
     /// Events in the idle time before the press.
     pub idle: u64,
+    /// See [`PressView::core_threshold`].
+    pub core_threshold: Option<u32>,
     /// See [`PressView::width_u`].
     pub width_u: Option<f64>,
 }
@@ -151,6 +153,7 @@ pub(crate) fn press_view(
         spread_u: sighting.spread_u,
         spread_v: sighting.spread_v,
         width_u: tally.width_u,
+        core_threshold: tally.core_threshold,
     }
 }
 
@@ -440,23 +443,27 @@ impl<'a> Accumulator<'a> {
     }
 
     fn close(&mut self, mut done: OpenWindow) {
+        let window = done.window;
+        let core_threshold = window.core_threshold(self.settings, self.camera, done.idle_events);
         if self.estimator.is_none() || done.on.is_some() {
+            self.dbscan.set_min_samples(core_threshold);
             self.dbscan.run(&done.grid);
         }
         let sighting = match &mut self.estimator {
             None => ColumnEstimate::of_clusters(&self.dbscan, self.settings.centroid, 1),
             Some(estimator) => {
                 done.events.sort_unstable();
-                estimator.estimate(&done.events, 0)
+                estimator.estimate(&done.events, 0, core_threshold)
             }
         };
         let tally = EventCounts {
             events: done.grid.events(),
             on: done.on_events,
             idle: done.idle_events,
-            width_u: width_u(&done.grid, done.idle_events, &done.window),
+            core_threshold: (self.settings.estimator == Estimator::Dbscan)
+                .then_some(core_threshold),
+            width_u: width_u(&done.grid, done.idle_events, &window),
         };
-        let window = done.window;
         self.views
             .push((window.row, press_view(&window, tally, &sighting)));
         if let Some(on) = done.on.take()

@@ -1,14 +1,17 @@
 //! Owns caveats about the results as a whole: settings that do not fit the data, contradictory results.
 
-use skinrig_model::{AnalysisSettings, CameraId, Estimator, SENSOR_WIDTH};
+use skinrig_model::{AnalysisSettings, CameraId, Estimator};
 
+use crate::background::{Background, CoreThreshold};
 use crate::metrics::quantile;
 use crate::result::{
-    Analysis, Estimate, PressResult, Reduction, ReductionRow, Warning, WarningCause,
+    Analysis, Estimate, PressResult, PressView, Reduction, ReductionRow, Warning, WarningCause,
 };
 
 /// A thinned row is comparable if it locates at least this share of what all events locate.
 const COMPARABLE: f64 = 0.95;
+/// Share of presses with a dense background that is worth a caveat.
+const MANY: f64 = 0.1;
 
 /// Caveats of a finished analysis.
 pub(crate) fn caveats(analysis: &Analysis) -> Vec<Warning> {
@@ -22,8 +25,9 @@ pub(crate) fn caveats(analysis: &Analysis) -> Vec<Warning> {
     dense.chain(disagree).chain(fewer).collect()
 }
 
-/// A caveat if the background alone creates core events: the events expected in a neighbourhood plus two standard deviations
-/// (Poisson) reach the core threshold of DBSCAN.
+/// A caveat if the background alone creates core events in some presses: the events expected in a neighbourhood plus two standard
+/// deviations (Poisson) reach the core threshold of DBSCAN. Where the threshold follows the background, that happens only to presses
+/// without idle time of their own; the median of the others stands in for it.
 fn dense_background(
     settings: &AnalysisSettings,
     presses: &[PressResult],
@@ -32,25 +36,34 @@ fn dense_background(
     if settings.estimator != Estimator::Dbscan || settings.bin_px != 1 {
         return None;
     }
-    let views = presses.iter().filter_map(|p| p.views[camera.index()]);
-    let mut events: Vec<f64> = views
-        .filter(|v| v.idle_s > 0.0 && v.rate_per_s > 0.0)
-        .map(|v| v.idle_rate_per_s * f64::from(v.events) / v.rate_per_s)
+    let views = || presses.iter().filter_map(|p| p.views[camera.index()]);
+    let mut idle_rates: Vec<f64> = views()
+        .filter(|v| v.idle_s > 0.0)
+        .map(|v| v.idle_rate_per_s)
         .collect();
-    let (first, last) = settings.crop_v[camera.index()];
-    let pixels = f64::from(SENSOR_WIDTH) * (f64::from(last) - f64::from(first) + 1.0);
-    let disc = std::f64::consts::PI * settings.eps_px * settings.eps_px;
-    let neighbours = quantile(&mut events, 0.5)? * disc / pixels;
-    let spread = neighbours.sqrt();
-    (neighbours + 2.0 * spread >= f64::from(settings.min_samples)).then(|| {
-        let cause = WarningCause::DenseBackground {
-            neighbours,
-            eps_px: settings.eps_px,
-            min_samples: settings.min_samples,
-            advised_min_samples: (neighbours + 4.0 * spread).ceil() + 1.0,
-        };
-        Warning::of_camera(camera, cause)
-    })
+    let background = Background {
+        events: quantile(&mut idle_rates, 0.5)?.round() as u64,
+        idle_us: 1_000_000,
+    };
+    let dense = |view: &PressView| {
+        let window_s = f64::from(view.events) / view.rate_per_s;
+        let window_us = (window_s.is_finite()).then_some((window_s * 1e6) as u64)?;
+        let neighbours = background.neighbours(settings, camera, window_us);
+        let reach = neighbours + 2.0 * neighbours.sqrt();
+        (reach >= f64::from(view.core_threshold?)).then_some(neighbours)
+    };
+    let mut of_dense: Vec<f64> = views().filter_map(|v| dense(&v)).collect();
+    if (of_dense.len() as f64) < MANY * views().count() as f64 {
+        return None;
+    }
+    let neighbours = quantile(&mut of_dense, 0.5)?;
+    let cause = WarningCause::DenseBackground {
+        neighbours,
+        eps_px: settings.eps_px,
+        min_samples: settings.min_samples,
+        advised_min_samples: f64::from(CoreThreshold::ADVISED.at(neighbours)),
+    };
+    Some(Warning::of_camera(camera, cause))
 }
 
 /// A caveat if the scored presses and the held-out calibration locations have errors that differ by more than both

@@ -12,6 +12,7 @@ mod accumulate;
 mod activity;
 mod analyze;
 mod audit;
+pub mod background;
 pub mod bit_rates;
 pub mod calibrate;
 mod camera_clocks;

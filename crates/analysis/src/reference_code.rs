@@ -11,6 +11,7 @@ use skinrig_model::{
     CalibrationModel, CentroidRule, LensKind, PressRole, PressVerdict, RepetitionId, StereoGeometry,
 };
 
+use crate::background::CoreThreshold;
 use crate::calibrate::calibrate;
 use crate::input::SessionInput;
 use crate::locator::FittedLocator;
@@ -146,7 +147,10 @@ fn reduction(
         locator: &FittedLocator::rays(*geometry),
         outline: &analysis.rig.outline,
         settings,
-        min_samples: MIN_SAMPLES,
+        core: CoreThreshold {
+            min_samples: MIN_SAMPLES,
+            margin: 0.0,
+        },
         centroid: CentroidRule::AllClusters,
         kinds: &[Thinning::Exact],
     };

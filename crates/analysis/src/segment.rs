@@ -1,14 +1,15 @@
 //! Windows: the interval of camera time that belongs to each press.
 
-use skinrig_model::{AnalysisSettings, PressTiming, WindowAnchor};
+use skinrig_model::{AnalysisSettings, CameraId, PressTiming, WindowAnchor};
 
+use crate::background::Background;
 use crate::input::EarlierAttempt;
 use crate::result::ClockFit;
 
 /// Maximum idle time before a press, µs.
-const IDLE_US: u64 = 500_000;
+pub const IDLE_US: u64 = 500_000;
 /// Minimum idle time for a rate, µs.
-const MIN_IDLE_US: u64 = 20_000;
+pub const MIN_IDLE_US: u64 = 20_000;
 
 /// Window of one press in camera time. All intervals are half-open, µs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +36,20 @@ impl Window {
     #[must_use]
     pub fn idle_s(&self) -> f64 {
         (self.start_us - self.idle_start_us) as f64 * 1e-6
+    }
+
+    /// Core threshold of DBSCAN in this window of a camera, after this many events in its idle time.
+    pub(crate) fn core_threshold(
+        &self,
+        settings: &AnalysisSettings,
+        camera: CameraId,
+        idle_events: u64,
+    ) -> u32 {
+        let background = Background {
+            events: idle_events,
+            idle_us: self.start_us - self.idle_start_us,
+        };
+        background.core_threshold(settings, camera, self.end_us - self.start_us)
     }
 
     /// True if bytes were lost within the window.

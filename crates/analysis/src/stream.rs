@@ -188,6 +188,7 @@ mod tests {
                 spread_u: None,
                 spread_v: None,
                 width_u: None,
+                core_threshold: None,
             },
             3,
         )

@@ -347,6 +347,7 @@ mod tests {
                 spread_u: None,
                 spread_v: None,
                 width_u: None,
+                core_threshold: None,
             })
         };
         let judge = |role, first, second| {

@@ -388,6 +388,10 @@ pub struct AnalysisSettings {
     /// Core threshold of DBSCAN, events; the paper's 10.
     #[setting(default = "10", min = 1, max = 1_000_000)]
     pub min_samples: u32,
+    /// Keeps the background out of clusters: the core threshold is at least the events that the idle rate puts within eps of a
+    /// pixel during the window, plus this many of their standard deviations (Poisson). 0: `min_samples` alone, as in the paper.
+    #[setting(default = "4", max = 100.0)]
+    pub background_margin: f64,
     /// Clustered events that form the centroid of a press.
     #[setting(default = "largest_cluster")]
     pub centroid: CentroidRule,

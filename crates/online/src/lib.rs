@@ -37,7 +37,7 @@ pub use interleave::interleave;
 pub use learn::learn;
 pub use live::{Decoders, Live};
 pub use model::TouchModel;
-pub use position::{Position, PositionEstimator, PositionRow};
+pub use position::{Opening, Position, PositionEstimator, PositionRow};
 pub use score::{DetectionScore, ScoredPress};
 pub use skin_model::SkinModel;
 pub use slots::Uncounted;

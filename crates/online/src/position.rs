@@ -4,10 +4,12 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 use skinrig_analysis::Analysis;
+use skinrig_analysis::background::Background;
 use skinrig_analysis::estimators::{PressEstimator, Thinning};
 use skinrig_analysis::locator::{CameraFeatures, FittedLocator, Location, LocatorModelError};
 use skinrig_analysis::press_events::PackedEvent;
 use skinrig_analysis::result::{LocationOutcome, Region};
+use skinrig_analysis::segment::Window;
 use skinrig_model::{
     AnalysisSettings, CameraId, CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH, SkinOutline,
 };
@@ -68,6 +70,8 @@ struct CameraWindow {
     history: VecDeque<CdEvent>,
     forgotten_us: Option<u64>,
     from_us: Option<u64>,
+    /// Of the idle time before the window.
+    background: Background,
     /// Events since the start of the window.
     events: Vec<PackedEvent>,
     in_order: bool,
@@ -84,6 +88,7 @@ impl CameraWindow {
             history: VecDeque::with_capacity(HISTORY),
             forgotten_us: None,
             from_us: None,
+            background: Background::default(),
             events: Vec::with_capacity(MOST),
             in_order: true,
             complete: true,
@@ -122,14 +127,22 @@ impl CameraWindow {
         }
     }
 
-    fn open(&mut self, from_us: u64) {
+    fn open(&mut self, Opening { idle_us, from_us }: Opening) {
         (self.from_us, self.in_order) = (Some(from_us), true);
         self.complete = self
             .forgotten_us
-            .is_none_or(|forgotten| forgotten < from_us);
+            .is_none_or(|forgotten| forgotten < idle_us.min(from_us));
+        let idle_us = self.forgotten_us.map_or(idle_us, |f| idle_us.max(f + 1));
         self.events.clear();
         let history = std::mem::take(&mut self.history);
         history.iter().for_each(|event| self.add(event, from_us));
+        let idle = history
+            .iter()
+            .filter(|e| (idle_us..from_us).contains(&e.t_us));
+        self.background = Background {
+            events: idle.count() as u64,
+            idle_us: from_us.saturating_sub(idle_us),
+        };
         self.history = history;
     }
 
@@ -139,7 +152,12 @@ impl CameraWindow {
     }
 
     /// What the camera saw until `until_us`, and how many events.
-    fn features(&mut self, until_us: u64) -> (CameraFeatures, u32) {
+    fn features(
+        &mut self,
+        settings: &AnalysisSettings,
+        camera: CameraId,
+        until_us: u64,
+    ) -> (CameraFeatures, u32) {
         let Some(from_us) = self.from_us else {
             return (CameraFeatures::default(), 0);
         };
@@ -149,8 +167,28 @@ impl CameraWindow {
         }
         let end = until_us.saturating_sub(from_us);
         let count = self.events.partition_point(|e| u64::from(e.t_us()) < end);
-        let estimate = self.estimator.estimate(&self.events[..count], 0);
+        let threshold = self.background.core_threshold(settings, camera, end);
+        let events = &self.events[..count];
+        let estimate = self.estimator.estimate(events, 0, threshold);
         (CameraFeatures::from(&estimate), count as u32)
+    }
+}
+
+/// Where a window begins in one camera, µs of camera time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Opening {
+    /// Start of the idle time before the window, which tells the background; `from_us` if there is none.
+    pub idle_us: u64,
+    /// Start of the window.
+    pub from_us: u64,
+}
+
+impl From<Window> for Opening {
+    fn from(window: Window) -> Self {
+        Self {
+            idle_us: window.idle_start_us,
+            from_us: window.start_us,
+        }
     }
 }
 
@@ -158,6 +196,7 @@ impl CameraWindow {
 /// the analysis.
 #[derive(Debug, Clone)]
 pub struct PositionEstimator {
+    settings: AnalysisSettings,
     cameras: [CameraWindow; 2],
     locator: FittedLocator,
     outline: SkinOutline,
@@ -183,6 +222,7 @@ impl PositionEstimator {
         outline: SkinOutline,
     ) -> Self {
         Self {
+            settings: settings.clone(),
             cameras: CameraId::ALL.map(|camera| CameraWindow::new(settings, camera)),
             locator,
             outline,
@@ -195,10 +235,10 @@ impl PositionEstimator {
         events.iter().for_each(|event| window.push(event));
     }
 
-    /// Opens a window that begins at these times of the cameras, µs; earlier events may have been pushed already.
-    pub fn open(&mut self, from_us: [u64; 2]) {
-        for (window, from_us) in self.cameras.iter_mut().zip(from_us) {
-            window.open(from_us);
+    /// Opens a window; its events and those of its idle time may have been pushed already.
+    pub fn open(&mut self, openings: [Opening; 2]) {
+        for (window, opening) in self.cameras.iter_mut().zip(openings) {
+            window.open(opening);
         }
     }
 
@@ -215,8 +255,11 @@ impl PositionEstimator {
     /// The position by the events before these times of the cameras, µs; without the region that holds at every instant.
     #[must_use]
     pub fn position(&mut self, until_us: [u64; 2]) -> Position {
-        let [one, two] = &mut self.cameras;
-        let seen = [one.features(until_us[0]), two.features(until_us[1])];
+        let settings = &self.settings;
+        let seen = CameraId::ALL.map(|camera| {
+            let k = camera.index();
+            self.cameras[k].features(settings, camera, until_us[k])
+        });
         let (outcome, location) = self.locator.outcome(&self.outline, seen.map(|s| s.0));
         Position {
             outcome,

@@ -4,10 +4,11 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 use skinrig_analysis::locator::LocatorModelError;
+use skinrig_analysis::segment::{IDLE_US, MIN_IDLE_US};
 use skinrig_model::{CameraId, CdEvent};
 
 use crate::detector::{Detection, Detector, Felt, UnusableClock};
-use crate::position::{Position, PositionEstimator};
+use crate::position::{Opening, Position, PositionEstimator};
 use crate::settling::Settling;
 use crate::skin_model::SkinModel;
 
@@ -72,6 +73,8 @@ pub(crate) struct TouchStream {
     before_us: i64,
     every_us: i64,
     touch: Option<OpenTouch>,
+    /// Host time since which no touch is felt, µs.
+    idle_since_us: i64,
     decisions: Vec<Detection>,
 }
 
@@ -97,6 +100,7 @@ impl TouchStream {
             before_us: (skin.settings.window_before_ms * 1e3) as i64,
             every_us: every_us.max(1),
             touch: None,
+            idle_since_us: from_us,
             decisions: Vec::with_capacity(64),
         })
     }
@@ -177,8 +181,7 @@ impl TouchStream {
             each(Estimate::Felt(decision));
             match decision.felt {
                 Felt::Onset => {
-                    let from_us = self.detector.camera_us(decision.since_us - self.before_us);
-                    self.positions.open(from_us);
+                    self.open(decision.since_us - self.before_us);
                     self.touch = Some(OpenTouch {
                         next_us: decision.host_us,
                     });
@@ -186,11 +189,28 @@ impl TouchStream {
                 Felt::Withdrawn | Felt::Release => {
                     self.positions.close();
                     self.touch = None;
+                    self.idle_since_us = decision.host_us;
                 }
             }
         }
         self.decisions = decisions;
         self.positions_until(self.detector.now_us(), &mut each);
+    }
+
+    /// Opens a window that begins at this host time; the idle time before it is as long as an analysis takes it, but begins after the
+    /// touch before.
+    fn open(&mut self, from_us: i64) {
+        let idle_us = (from_us - IDLE_US as i64).max(self.idle_since_us);
+        let idle_us = if from_us - idle_us >= MIN_IDLE_US as i64 {
+            idle_us
+        } else {
+            from_us
+        };
+        let [idle, from] = [idle_us, from_us].map(|t| self.detector.camera_us(t));
+        self.positions.open([0, 1].map(|k| Opening {
+            idle_us: idle[k],
+            from_us: from[k],
+        }));
     }
 
     fn positions_until(&mut self, host_us: i64, each: &mut impl FnMut(Estimate)) {

@@ -6,7 +6,7 @@
 /// press, thresholds 17 to 19, and 3 to 8 at 1/1024 of the events. Each has its source in `docs/reference/paper.md`.
 ///
 /// The calibration stays the protocol's: the block that judges as published fits the paper's eight parameters itself.
-pub const REFERENCE_CODE: [&str; 32] = [
+pub const REFERENCE_CODE: [&str; 33] = [
     "analysis.crop.camera1=[185 px, 360 px]",
     "analysis.crop.camera2=[200 px, 355 px]",
     "analysis.window_anchor=middle",
@@ -14,6 +14,7 @@ pub const REFERENCE_CODE: [&str; 32] = [
     "analysis.window_after=868 s / 578",
     "analysis.eps=10 px",
     "analysis.min_samples=10",
+    "analysis.background_margin=0",
     "analysis.centroid=all_clusters",
     "analysis.estimator=dbscan",
     "analysis.thinning=1",

@@ -58,7 +58,9 @@ pub(crate) fn document(opened: &OpenSession, press: PressId) -> Result<Value, Pr
                 grid.add(event.x, event.y);
             },
         )?;
-        let mut search = Dbscan::new(settings.eps_px, settings.min_samples);
+        let view = analysis.presses.iter().find(|p| p.press == press);
+        let own = view.and_then(|p| p.views[k]?.core_threshold);
+        let mut search = Dbscan::new(settings.eps_px, own.unwrap_or(settings.min_samples));
         search.run(&grid);
         let clusters: Vec<Value> = search
             .clusters()

@@ -45,6 +45,7 @@ fn doubled_events_with_doubled_thresholds_give_the_same_positions() {
         "presses[].views[].events",
         "presses[].views[].on_events",
         "presses[].views[].cluster_events",
+        "presses[].views[].core_threshold",
         "presses[].views[].rate_per_s",
         "presses[].views[].idle_rate_per_s",
         "rates[].mean_per_s[]",
@@ -73,6 +74,7 @@ fn doubled_events_with_doubled_thresholds_give_the_same_positions() {
             }
             let settings = &mut session.input.settings;
             settings.min_samples *= 2;
+            settings.background_margin = 0.0;
             settings.min_cluster_events *= 2;
         },
         expect: &|path, figure| {

@@ -309,6 +309,9 @@ fn a_background_that_makes_clusters_of_its_own_is_called_out() {
     assert_eq!(suggested(&input), [0.0; 0]);
     input.settings.eps_px = 50.0;
     input.settings.min_samples = 3;
+    // The core threshold follows the background, unless the settings forbid it.
+    assert_eq!(suggested(&input), [0.0; 0]);
+    input.settings.background_margin = 0.0;
     let found = suggested(&input);
     assert_eq!(found.len(), 2, "{found:?}");
     input.settings.min_samples = found[0] as u32;

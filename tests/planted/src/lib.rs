@@ -128,6 +128,7 @@ pub const fn view(u: f64, events: u32) -> Option<PressView> {
         spread_u: None,
         spread_v: None,
         width_u: None,
+        core_threshold: None,
     })
 }
 

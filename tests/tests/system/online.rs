@@ -4,8 +4,8 @@ use skinrig_analysis::segment::{Window, windows};
 use skinrig_analysis::{Analysis, SessionInput, analyze};
 use skinrig_model::{CameraId, SimLevel};
 use skinrig_online::{
-    DetectionScore, Detector, IdleStatistic, PositionEstimator, ScoredPress, Training, interleave,
-    learn,
+    DetectionScore, Detector, IdleStatistic, Opening, PositionEstimator, ScoredPress, Training,
+    interleave, learn,
 };
 use skinrig_results::{AlignedSession, AnalysisOptions, Session};
 use skinrig_sim::{SimConfig, simulated_rig};
@@ -31,7 +31,6 @@ limits:
   max_force: 5 N
 triggers: {marks: [contact, retract]}
 evaluation: {calibrate: [1], score: [2]}
-analysis: {min_samples: 20}
 ";
 
 fn session(test: impl FnOnce(&AlignedSession, &Analysis)) {
@@ -98,7 +97,7 @@ fn positions_are_those_of_the_analysis(aligned: &AlignedSession, analysis: &Anal
         if open.is_none()
             && let Some(next) = windows.next_if(|w| passed(w.map(|w| w.start_us)))
         {
-            positions.open(next.map(|w| w.start_us));
+            positions.open(next.map(Opening::from));
             open = Some(next);
         }
         true

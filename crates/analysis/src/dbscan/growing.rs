@@ -35,6 +35,24 @@ impl GrowingDbscan {
         self.grid.events()
     }
 
+    /// The core threshold.
+    pub(crate) const fn min_samples(&self) -> u32 {
+        self.dbscan.min_samples
+    }
+
+    /// Uses another core threshold from the next run on. Core pixels may then have to be found again, so a change costs as much as
+    /// starting over.
+    pub(crate) fn set_min_samples(&mut self, min_samples: u32) {
+        if min_samples == self.dbscan.min_samples {
+            return;
+        }
+        self.dbscan.min_samples = min_samples;
+        for &tile in &self.dbscan.occupied {
+            let tile = &mut self.dbscan.all[tile];
+            (tile.core, tile.groups) = (0, (0, 0));
+        }
+    }
+
     /// Adds an event at column `u`, row `v`; outside the rows, or beyond 2^32 - 1 events, none.
     #[inline]
     pub(crate) fn add(&mut self, u: u16, v: u16) {

@@ -189,6 +189,11 @@ impl Dbscan {
         self
     }
 
+    /// Uses this core threshold (at least 1) from the next run on.
+    pub fn set_min_samples(&mut self, min_samples: u32) {
+        self.min_samples = min_samples;
+    }
+
     /// Clusters the events of `grid`; the result is valid until the next call.
     pub fn run(&mut self, grid: &PixelGrid) -> &[Cluster] {
         // Pixels are counted and found in words of bits: POPCNT and TZCNT.

@@ -33,11 +33,12 @@ impl Clusters {
     }
 
     /// See `super::PressEstimator::estimate`.
-    pub fn estimate(&mut self, events: &[PackedEvent]) -> ColumnEstimate {
+    pub fn estimate(&mut self, events: &[PackedEvent], core_threshold: u32) -> ColumnEstimate {
         for event in events {
             self.grid
                 .add(event.x() >> self.shift, event.y() >> self.shift);
         }
+        self.dbscan.set_min_samples(core_threshold);
         self.dbscan.run(&self.grid);
         self.grid.clear();
         ColumnEstimate::of_clusters(&self.dbscan, self.rule, self.side_px)

@@ -87,10 +87,16 @@ impl PressEstimator {
         })
     }
 
-    /// Estimates the column of a window that begins at `from_us`, from its events in time order.
-    pub fn estimate(&mut self, events: &[PackedEvent], from_us: u32) -> ColumnEstimate {
+    /// Estimates the column of a window that begins at `from_us`, from its events in time order. Estimators that cluster use the
+    /// core threshold of this window.
+    pub fn estimate(
+        &mut self,
+        events: &[PackedEvent],
+        from_us: u32,
+        core_threshold: u32,
+    ) -> ColumnEstimate {
         match &mut self.0 {
-            Kind::Clusters(e) => e.estimate(events),
+            Kind::Clusters(e) => e.estimate(events, core_threshold),
             Kind::Median(e) => e.estimate(events),
             Kind::Peak64(e) => e.estimate(events),
             Kind::Peak32(e) => e.estimate(events),

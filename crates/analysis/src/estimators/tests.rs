@@ -36,7 +36,7 @@ fn settings(estimator: Estimator, precision: Precision, bin_px: u16) -> Analysis
 }
 
 fn estimate(s: &AnalysisSettings, events: &[PackedEvent]) -> ColumnEstimate {
-    PressEstimator::new(s, ROWS).estimate(events, 0)
+    PressEstimator::new(s, ROWS).estimate(events, 0, s.min_samples)
 }
 
 /// A press: events around column `u` (standard deviation `sd`), and background over the whole crop, in time order.
@@ -146,9 +146,9 @@ fn an_estimator_has_no_state_between_presses() {
     for (estimator, precision) in ALL {
         let s = settings(estimator, precision, 2);
         let mut used = PressEstimator::new(&s, ROWS);
-        let fresh = used.estimate(&a, 0);
-        used.estimate(&b, 0);
-        assert_eq!(used.estimate(&a, 0), fresh, "{estimator:?}");
+        let fresh = used.estimate(&a, 0, s.min_samples);
+        used.estimate(&b, 0, s.min_samples);
+        assert_eq!(used.estimate(&a, 0, s.min_samples), fresh, "{estimator:?}");
     }
 }
 

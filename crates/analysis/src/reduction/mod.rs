@@ -1,6 +1,7 @@
 //! The data-reduction study: localisation on thinned events.
 //!
-//! Everything except the number of events is fixed: one clustering for all factors, and the centroid rule, locator
+//! Everything except the number of events is fixed: one clustering for all factors (whose core threshold follows the
+//! background as it thins), and the centroid rule, locator
 //! and location rules of the settings. The study uses the retained scored presses that were executed as planned:
 //! valid ones, and those excluded by a rule on the data, but not those that the journal or the settings exclude by hand. A
 //! press is *located* if its rays meet where no location rule excludes it (behind a camera, parallel, outside the outline,
@@ -16,6 +17,7 @@ mod trials;
 
 use skinrig_model::PressRole;
 
+use crate::background::CoreThreshold;
 use crate::locator::FittedLocator;
 use crate::metrics::quantile;
 use crate::over_locations::rate_over_locations;
@@ -41,9 +43,12 @@ pub fn study(
         locator,
         outline: &analysis.rig.outline,
         settings,
-        min_samples: match settings.reduction.min_samples {
-            0 => settings.min_samples,
-            named => named,
+        core: match settings.reduction.min_samples {
+            0 => CoreThreshold::of(settings),
+            named => CoreThreshold {
+                min_samples: named,
+                ..CoreThreshold::of(settings)
+            },
         },
         centroid: settings.centroid,
         kinds: &[Thinning::Exact, Thinning::Bernoulli],
@@ -65,7 +70,7 @@ pub fn study(
     };
     Some(Reduction {
         eps_px: settings.eps_px,
-        min_samples: trials.min_samples,
+        min_samples: trials.core.min_samples,
         seeds: settings.reduction.seeds,
         presses: attempts.len() as u32,
         pass_threshold_mm,

@@ -15,6 +15,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::Rng;
 use skinrig_model::CentroidRule;
 
+use crate::background::CoreThreshold;
 use crate::dbscan::GrowingDbscan;
 use crate::estimators::ColumnEstimate;
 use crate::locator::CameraFeatures;
@@ -34,7 +35,9 @@ pub(super) struct ThinnedView {
 /// Thins the views of one camera, one after another.
 pub(super) struct Thinner {
     remaining: GrowingDbscan,
-    min_samples: u32,
+    core: CoreThreshold,
+    /// Events that the background puts within eps of a pixel of the whole view.
+    neighbours: f64,
     centroid: CentroidRule,
     /// (column, row) of each event of the view, in an order that each seed reshuffles.
     pixels: Vec<(u16, u16)>,
@@ -46,20 +49,23 @@ impl Thinner {
     pub(super) fn new(
         crop: (u16, u16),
         eps_px: f64,
-        min_samples: u32,
+        core: CoreThreshold,
         centroid: CentroidRule,
     ) -> Self {
         Self {
-            remaining: GrowingDbscan::new(crop, eps_px, min_samples),
-            min_samples,
+            remaining: GrowingDbscan::new(crop, eps_px, core.min_samples),
+            core,
+            neighbours: 0.0,
             centroid,
             pixels: Vec::new(),
             steps: Vec::new(),
         }
     }
 
-    /// Loads the events of a view, fewer than 2^32, and returns the unthinned result.
-    pub(super) fn load(&mut self, events: &[PackedEvent]) -> ThinnedView {
+    /// Loads the events of a view, fewer than 2^32, to which the background adds `neighbours` events within eps of a pixel, and
+    /// returns the unthinned result.
+    pub(super) fn load(&mut self, events: &[PackedEvent], neighbours: f64) -> ThinnedView {
+        self.neighbours = neighbours;
         self.pixels.clear();
         self.pixels.extend(events.iter().map(|e| (e.x(), e.y())));
         let n = self.count();
@@ -119,8 +125,12 @@ impl Thinner {
         }
     }
 
-    /// Adds the first `count` events, except those that were added before.
+    /// Makes the first `count` events the remaining ones; fewer remained before. The background thins with the press, and the core
+    /// threshold follows it.
     fn grow(&mut self, count: u32) {
+        let share = f64::from(count) / f64::from(self.count().max(1));
+        self.remaining
+            .set_min_samples(self.core.at(self.neighbours * share));
         for &(u, v) in &self.pixels[self.remaining.events() as usize..count as usize] {
             self.remaining.add(u, v);
         }
@@ -129,7 +139,7 @@ impl Thinner {
     /// Centroid of the remaining events.
     fn left(&mut self) -> ThinnedView {
         let events = self.remaining.events();
-        let features = if events < self.min_samples {
+        let features = if events < self.remaining.min_samples() {
             CameraFeatures::default() // no event has that many neighbours
         } else {
             let clusters = self.remaining.run();
@@ -159,6 +169,13 @@ mod tests {
 
     const CROP: (u16, u16) = (185, 360);
 
+    const fn core(min_samples: u32) -> CoreThreshold {
+        CoreThreshold {
+            min_samples,
+            margin: 4.0,
+        }
+    }
+
     fn events(pixels: &[(u16, u16)]) -> Vec<PackedEvent> {
         let event = |(t_us, &(x, y)): (u64, &(u16, u16))| CdEvent {
             t_us,
@@ -175,22 +192,25 @@ mod tests {
         #[test]
         fn every_step_clusters_the_remaining_events(
             pixels in prop::collection::vec((300u16..340, 250u16..270), 0..300), min_samples in 1u32..12, seed in 0u64..1000,
+            neighbours in prop_oneof![Just(0.0), 0.0..20.0],
         ) {
             const POWERS: u32 = 9;
             let rule = CentroidRule::LargestCluster;
-            let mut thinner = Thinner::new(CROP, 3.0, min_samples, rule);
+            let mut thinner = Thinner::new(CROP, 3.0, core(min_samples), rule);
             let fresh = |chosen: &[(u16, u16)]| {
                 let mut grid = PixelGrid::new(CROP);
                 chosen.iter().for_each(|(u, v)| assert!(grid.add(*u, *v)));
-                let mut dbscan = Dbscan::new(3.0, min_samples);
+                let share = chosen.len() as f64 / pixels.len().max(1) as f64;
+                let threshold = core(min_samples).at(neighbours * share);
+                let mut dbscan = Dbscan::new(3.0, threshold);
                 dbscan.run(&grid);
-                let features = match chosen.len() < min_samples as usize {
+                let features = match chosen.len() < threshold as usize {
                     true => CameraFeatures::default(),
                     false => CameraFeatures::from(&ColumnEstimate::of_clusters(&dbscan, rule, 1)),
                 };
                 ThinnedView { events: chosen.len() as u32, features }
             };
-            prop_assert_eq!(thinner.load(&events(&pixels)), fresh(&pixels));
+            prop_assert_eq!(thinner.load(&events(&pixels), neighbours), fresh(&pixels));
             let mut rng = seeded::generator(seed, 0);
             let mut out = Vec::new();
             for _ in 0..2 {
@@ -217,8 +237,8 @@ mod tests {
     fn every_event_is_as_likely_and_counts_are_binomial() {
         // 40 events on as many distant pixels: the grid shows which remain.
         let pixels: Vec<(u16, u16)> = (0..40).map(|i| (15 * i, 200)).collect();
-        let mut thinner = Thinner::new(CROP, 1.0, 1, CentroidRule::AllClusters);
-        thinner.load(&events(&pixels));
+        let mut thinner = Thinner::new(CROP, 1.0, core(1), CentroidRule::AllClusters);
+        thinner.load(&events(&pixels), 0.0);
         let (mut rng, mut out) = (seeded::generator(5, 0), Vec::new());
         const RUNS: u32 = 20_000;
         const KINDS: [Thinning; 2] = [Thinning::Exact, Thinning::Bernoulli];

@@ -1,9 +1,10 @@
 //! Locates thinned presses: each press, seed and factor.
 
 use rayon::prelude::*;
-use skinrig_model::{AnalysisSettings, CentroidRule, Point2, PressId, SkinOutline};
+use skinrig_model::{AnalysisSettings, CameraId, CentroidRule, Point2, PressId, SkinOutline};
 
 use super::thinning::{ThinnedView, Thinner};
+use crate::background::{Background, CoreThreshold};
 use crate::locator::FittedLocator;
 use crate::press_events::{EventView, RetainedPress};
 use crate::result::{LocationOutcome, PressResult, Thinning};
@@ -34,12 +35,21 @@ impl<'a> Attempt<'a> {
     /// Events per second of both cameras in the idle time before the press; `None` if one of them has none.
     pub(super) fn idle_events_per_s(&self) -> Option<f64> {
         let rate = |view: &EventView| {
-            let (from, to) = (view.idle_from_us, view.window_us.0);
-            let idle_s = f64::from(to.saturating_sub(from)) * 1e-6;
-            (idle_s > 0.0).then(|| view.between(from, to).len() as f64 / idle_s)
+            let idle = background(view);
+            let idle_s = idle.idle_us as f64 * 1e-6;
+            (idle_s > 0.0).then(|| idle.events as f64 / idle_s)
         };
         let [one, two] = self.views;
         Some(rate(one)? + rate(two)?)
+    }
+}
+
+/// The idle time before the window of a view.
+fn background(view: &EventView) -> Background {
+    let (from, to) = (view.idle_from_us, view.window_us.0);
+    Background {
+        events: view.between(from, to).len() as u64,
+        idle_us: u64::from(to.saturating_sub(from)),
     }
 }
 
@@ -82,8 +92,8 @@ pub(crate) struct Trials<'a> {
     pub outline: &'a SkinOutline,
     /// Crop, radius, seeds and factors.
     pub settings: &'a AnalysisSettings,
-    /// DBSCAN core threshold at all factors.
-    pub min_samples: u32,
+    /// How the core threshold of DBSCAN follows the background at each factor.
+    pub core: CoreThreshold,
     pub centroid: CentroidRule,
     pub kinds: &'a [Thinning],
 }
@@ -97,9 +107,9 @@ impl Trials<'_> {
         accept: impl Fn(&LocationOutcome) -> Option<Point2> + Sync,
     ) -> Vec<Outcome> {
         let thinners = || {
-            self.settings.crop_v.map(|crop| {
-                Thinner::new(crop, self.settings.eps_px, self.min_samples, self.centroid)
-            })
+            self.settings
+                .crop_v
+                .map(|crop| Thinner::new(crop, self.settings.eps_px, self.core, self.centroid))
         };
         attempts
             .par_iter()
@@ -135,7 +145,13 @@ impl Trials<'_> {
                 events_per_s: per_s(0) + per_s(1),
             }
         };
-        let full = [0, 1].map(|k| thinners[k].load(attempt.views[k].press_events()));
+        let full = CameraId::ALL.map(|camera| {
+            let view = &attempt.views[camera.index()];
+            let (start, end) = view.window_us;
+            let window_us = u64::from(end.saturating_sub(start));
+            let neighbours = background(view).neighbours(self.settings, camera, window_us);
+            thinners[camera.index()].load(view.press_events(), neighbours)
+        });
         let full = trial(full);
         let mut thinned = Vec::new();
         let mut left = [Vec::new(), Vec::new()];

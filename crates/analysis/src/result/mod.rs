@@ -79,7 +79,7 @@ use crate::rule::Rule;
 /// positions have at least nine correct digits where the problem is well posed. Version 14: so have held-out errors; the
 /// estimated depth treats ON and OFF alike, and intervals are wider for few locations. Version 16: a depth that presses stopped short of has no
 /// errors of its own.
-pub const ANALYSIS_VERSION: u32 = 16;
+pub const ANALYSIS_VERSION: u32 = 17;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -432,6 +432,10 @@ pub struct PressView {
     /// it added too few.
     #[serde(default)]
     pub width_u: Option<f64>,
+    /// Core threshold of DBSCAN for this window, events: `min_samples`, or more where the background asks for it; `None` for
+    /// estimators that do not cluster, and in results before version 17.
+    #[serde(default)]
+    pub core_threshold: Option<u32>,
 }
 
 /// Events of one press in one camera, counted per pixel: all columns, rows of the crop.

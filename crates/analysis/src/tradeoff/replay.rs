@@ -244,13 +244,17 @@ impl<'a> Replay<'a> {
             };
             let view = &press.views[k];
             filter.window(view, &window, &mut events);
+            let idle = filter.idle(view, &window);
+            let core_threshold = window.core_threshold(settings, camera, idle);
             let tally = EventCounts {
                 events: events.len() as u32,
                 on: events.iter().filter(|e| e.is_on()).count() as u32,
-                idle: filter.idle(view, &window),
+                idle,
                 width_u: None,
+                core_threshold: Some(core_threshold),
             };
-            let sighting = estimator.estimate(&events, after(view, window.start_us));
+            let from_us = after(view, window.start_us);
+            let sighting = estimator.estimate(&events, from_us, core_threshold);
             out.push((press.row, press_view(&window, tally, &sighting)));
         }
         out
@@ -342,7 +346,7 @@ impl Filter {
     }
 
     /// Number of events in the idle time before it.
-    fn idle(&self, view: &EventView, window: &Window) -> u64 {
+    pub(super) fn idle(&self, view: &EventView, window: &Window) -> u64 {
         let events = view.between(
             after(view, window.idle_start_us),
             after(view, window.start_us),

@@ -25,8 +25,14 @@ pub(super) struct Time {
     pub range_us: (f64, f64),
 }
 
-/// Input of the timed part: per press and camera the events and the start of the window.
-type PreparedPresses = Vec<[(Vec<PackedEvent>, u32); 2]>;
+/// Input of the timed part: one press in one camera.
+#[derive(Default)]
+struct PreparedView {
+    events: Vec<PackedEvent>,
+    /// Start of the window after that of the view, µs.
+    from_us: u32,
+    core_threshold: u32,
+}
 
 /// Times each candidate `repeats` times after one warm-up run. Within a repeat every candidate runs once, so that a slow
 /// moment of the machine affects all. The stopwatch returns CPU seconds of this thread.
@@ -56,8 +62,8 @@ pub(super) fn run(
             let begun = stopwatch();
             for views in &prepared {
                 let found = [0, 1].map(|k| {
-                    let (events, from_us) = &views[k];
-                    estimators[k].estimate(events, *from_us)
+                    let view = &views[k];
+                    estimators[k].estimate(&view.events, view.from_us, view.core_threshold)
                 });
                 let cameras = found.each_ref().map(CameraFeatures::from);
                 std::hint::black_box(candidate.locator.outcome(outline, cameras));
@@ -82,17 +88,22 @@ fn prepare(
     replay: &Replay<'_>,
     presses: &[&RetainedPress],
     settings: &AnalysisSettings,
-) -> PreparedPresses {
+) -> Vec<[PreparedView; 2]> {
     let windows = CameraId::ALL.map(|camera| replay.windows_by_row(camera, settings));
     let filters = CameraId::ALL.map(|camera| Filter::new(camera, settings));
     let of = |press: &RetainedPress, k: usize, window: Option<Window>| {
-        let mut events = Vec::new();
-        let view = &press.views[k];
         let Some(window) = window else {
-            return (events, 0);
+            return PreparedView::default();
         };
+        let view = &press.views[k];
+        let mut events = Vec::new();
         filters[k].window(view, &window, &mut events);
-        (events, after(view, window.start_us))
+        let idle = filters[k].idle(view, &window);
+        PreparedView {
+            events,
+            from_us: after(view, window.start_us),
+            core_threshold: window.core_threshold(settings, CameraId::ALL[k], idle),
+        }
     };
     presses
         .iter()

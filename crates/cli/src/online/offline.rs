@@ -4,7 +4,7 @@ use skinrig_analysis::locator::LocatorModelError;
 use skinrig_analysis::segment::{Window, windows};
 use skinrig_analysis::{Analysis, SessionInput};
 use skinrig_model::{CameraId, CdEvent};
-use skinrig_online::PositionEstimator;
+use skinrig_online::{Opening, PositionEstimator};
 
 /// Presses whose windows both cameras have, in order of time.
 pub(super) struct Comparison<'a> {
@@ -69,7 +69,7 @@ impl<'a> Comparison<'a> {
                 .windows
                 .next_if(|w| passed(self.newest_us, w.map(|w| w.start_us)))
         {
-            self.positions.open(next.map(|w| w.start_us));
+            self.positions.open(next.map(Opening::from));
             self.open = Some(next);
         }
     }

@@ -85,6 +85,7 @@ pub(crate) fn press(
                 spread_u: Some(14.0),
                 spread_v: None,
                 width_u: Some(19.0),
+                core_threshold: Some(10),
             }
         })
     };
