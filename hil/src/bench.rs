@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use skinrig_analysis::Analysis;
 use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, Clock, EventCamera, Indenter, TriggerBox};
 use skinrig_model::{CameraId, HostDuration};
@@ -9,8 +10,6 @@ use skinrig_nightly::{Evidence, GoldenSession};
 use skinrig_protocol::RigFile;
 use skinrig_protocol::rig::Drill;
 use skinrig_protocol::suite::Light;
-
-use crate::findings::Findings;
 
 /// Evidence that explains why an operation failed. Boxed because it is large and rare.
 pub type Problem = Box<Evidence>;
@@ -30,17 +29,28 @@ pub struct Devices {
     pub clock: Box<dyn Clock>,
 }
 
-/// Result of a golden campaign.
+/// Result of a campaign.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GoldenRun {
+pub struct CampaignRun {
     /// The session and its report, relative to the night's folder.
     pub files: GoldenSession,
     /// Name of the skin, from the protocol.
     pub skin: Option<String>,
-    /// Version of the analysis.
-    pub analysis_version: u32,
-    /// Measurements in the units of the suite's metrics, and evidence: losses, faults, audit findings.
-    pub findings: Findings,
+    /// The analysis; `None` if there is none, for which `evidence` has the reason.
+    pub analysis: Option<Box<Analysis>>,
+    /// Bytes known to be lost, by camera.
+    pub lost_bytes: [u64; 2],
+    /// Evidence from the run: faults, losses, what stopped it.
+    pub evidence: Vec<Evidence>,
+}
+
+/// A session replayed as a live source, against its analysis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OnlineComparison {
+    /// Press windows compared.
+    pub windows: usize,
+    /// Those with the same bits.
+    pub equal: usize,
 }
 
 /// Result of a watchdog drill.
@@ -86,11 +96,17 @@ pub trait Bench {
     /// [`Problem`] when the drill could not be carried out.
     fn watchdog_drill(&mut self) -> Result<DrillResult, Problem>;
 
-    /// Closes every device, runs the golden campaign through controller and recorder, and analyses it.
+    /// Closes every device, runs a campaign through controller and recorder, and analyses it.
     ///
     /// # Errors
     /// [`Problem`] when there is no usable session.
-    fn run_golden(&mut self, protocol: &Path) -> Result<GoldenRun, Problem>;
+    fn run_campaign(&mut self, protocol: &Path) -> Result<CampaignRun, Problem>;
+
+    /// Replays the session of a campaign as a live source and compares the positions with its analysis.
+    ///
+    /// # Errors
+    /// [`Problem`] when the session cannot be replayed.
+    fn compare_online(&mut self, session: &GoldenSession) -> Result<OnlineComparison, Problem>;
 
     /// Folder for sessions. The check `disk` tests the disk that holds it.
     fn folder(&self) -> &Path;

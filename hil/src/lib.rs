@@ -18,7 +18,7 @@ pub mod runner;
 mod streams;
 mod test_volume;
 
-pub use bench::{Bench, Devices, DrillResult, GoldenRun, Problem, Slot};
+pub use bench::{Bench, CampaignRun, Devices, DrillResult, OnlineComparison, Problem, Slot};
 pub use checks::disk_write_rate;
 pub use findings::{Findings, GoldenRecord};
 pub use runner::{NightObserver, SuiteRunner};

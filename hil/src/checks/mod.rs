@@ -8,6 +8,7 @@ mod golden;
 mod identity;
 mod noise;
 mod pixels;
+mod reaction;
 mod robot;
 mod settings;
 mod stream;
@@ -39,6 +40,7 @@ pub fn run(check: &Check, bench: &mut dyn Bench) -> Findings {
         Measure::Depth { .. } => contact::depth,
         Measure::ForceCeiling { .. } => contact::force_ceiling,
         Measure::Golden { .. } => golden::golden,
+        Measure::Reaction { .. } => reaction::reaction,
         Measure::WatchdogDrill => drills::watchdog,
         Measure::StopDrill => drills::stop,
     };

@@ -33,7 +33,7 @@ fn expected_subjects(measure: &Measure, metric: &str, has_box: bool) -> &'static
         | Measure::Noise { .. }
         | Measure::TestPattern { .. } => CAMERAS,
         Measure::Disk { .. } => &["computer"],
-        Measure::Golden { .. } => &["skin"],
+        Measure::Golden { .. } | Measure::Reaction { .. } => &["skin"],
         Measure::RobotState
         | Measure::Repeatability { .. }
         | Measure::StepResponse { .. }

@@ -21,16 +21,18 @@ const POINTS: usize = 3;
 const DRILL_S: f64 = 20.0;
 /// Write rate of the slowest acceptable disk, bytes/s.
 const DISK_B_S: f64 = 60e6;
-/// Safety factor on the planned duration of a golden campaign.
-const GOLDEN_SAFETY_FACTOR: f64 = 1.25;
-/// Preflight, analysis and report of a golden campaign, s.
-const GOLDEN_OVERHEAD_S: f64 = 30.0;
+/// Safety factor on the planned duration of a campaign.
+const CAMPAIGN_SAFETY_FACTOR: f64 = 1.25;
+/// Preflight, analysis and report of a campaign, s.
+const CAMPAIGN_OVERHEAD_S: f64 = 30.0;
 
 /// Inputs of the time estimates that are not part of the suite.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PlanInputs {
     /// Planned duration of the golden protocol.
     pub golden: Option<HostDuration>,
+    /// Planned duration of the protocol of `reaction`.
+    pub reaction: Option<HostDuration>,
     /// Number of touch-off points.
     pub touch_points: Option<usize>,
 }
@@ -62,17 +64,20 @@ pub(crate) fn estimated_duration(check: &Check, inputs: &PlanInputs) -> HostDura
             points as f64 * f64::from(*presses) * PRESS_S
         }
         Measure::ForceCeiling { .. } => PRESS_S,
-        Measure::Golden { .. } => {
-            let plan_s = inputs.golden.map_or(0.0, HostDuration::as_secs_f64);
-            plan_s * GOLDEN_SAFETY_FACTOR + GOLDEN_OVERHEAD_S
-        }
+        Measure::Golden { .. } => campaign_s(inputs.golden),
+        Measure::Reaction { .. } => campaign_s(inputs.reaction),
         Measure::WatchdogDrill => DRILL_S,
         Measure::StopDrill => 2.0 * MOVE_S,
     };
     HostDuration::from_secs_f64(measuring_s + DEVICES_S)
 }
 
-/// How often a failed check of this suite is repeated. Two kinds are never repeated. The golden
+/// Estimated duration of a campaign, s.
+fn campaign_s(plan: Option<HostDuration>) -> f64 {
+    plan.map_or(0.0, HostDuration::as_secs_f64) * CAMPAIGN_SAFETY_FACTOR + CAMPAIGN_OVERHEAD_S
+}
+
+/// How often a failed check of this suite is repeated. Two kinds are never repeated. A
 /// campaign has its own retakes, and repeating presses until they pass would bias the result. After
 /// a failed force ceiling check or drill, the arm may not have stopped, so it must not move again
 /// unattended.
@@ -80,6 +85,7 @@ pub(crate) fn estimated_duration(check: &Check, inputs: &PlanInputs) -> HostDura
 pub(crate) const fn repeat_rule(suite: &Suite, measure: &Measure) -> RepeatRule {
     match measure {
         Measure::Golden { .. }
+        | Measure::Reaction { .. }
         | Measure::ForceCeiling { .. }
         | Measure::WatchdogDrill
         | Measure::StopDrill => RepeatRule::NEVER,
@@ -101,7 +107,7 @@ pub(crate) const fn prerequisites(measure: &Measure) -> &'static [&'static str] 
         | Measure::ForceCeiling { .. }
         | Measure::WatchdogDrill
         | Measure::StopDrill => &["robot_state"],
-        Measure::Golden { .. } => &["robot_state", "force_ceiling"],
+        Measure::Golden { .. } | Measure::Reaction { .. } => &["robot_state", "force_ceiling"],
         _ => &[],
     }
 }

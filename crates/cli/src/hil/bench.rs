@@ -8,15 +8,15 @@ use std::time::{Duration, Instant};
 use skinrig_controller::ControlHandle;
 use skinrig_device::CameraSettings;
 use skinrig_hil::lease::Lease;
-use skinrig_hil::{Bench, Devices, DrillResult, GoldenRun, Problem};
+use skinrig_hil::{Bench, CampaignRun, Devices, DrillResult, OnlineComparison, Problem};
 use skinrig_model::{CameraId, HostDuration};
-use skinrig_nightly::{Evidence, EvidenceKind};
+use skinrig_nightly::{Evidence, EvidenceKind, GoldenSession};
 use skinrig_protocol::CameraRequest;
 use skinrig_protocol::rig::{Drill, RigFile, RigKind};
 use skinrig_protocol::suite::Light;
 
 use super::real_bench::{RealBench, closed, software, subject, timing_slack_of};
-use super::{drill, golden, trouble};
+use super::{campaign, drill, trouble};
 use crate::rig::bench;
 
 /// Time limit for a program that switches the lamps.
@@ -123,9 +123,13 @@ impl Bench for RealBench {
         drill::watchdog(self)
     }
 
-    fn run_golden(&mut self, protocol: &Path) -> Result<GoldenRun, Problem> {
+    fn run_campaign(&mut self, protocol: &Path) -> Result<CampaignRun, Problem> {
         self.close();
-        golden::golden(self, protocol)
+        campaign::run(self, protocol)
+    }
+
+    fn compare_online(&mut self, session: &GoldenSession) -> Result<OnlineComparison, Problem> {
+        campaign::compare_online(self, session)
     }
 
     fn folder(&self) -> &Path {

@@ -12,6 +12,7 @@ use skinrig_hil::{Bench as _, SuiteRunner};
 use skinrig_model::HostDuration;
 use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::{Night, NightExit, Verdict, Versions, junit};
+use skinrig_protocol::Protocol;
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::suite::{Measure, Suite};
 use skinrig_report::night::{self, Trends, span};
@@ -205,7 +206,7 @@ fn known_checks(suite: &Suite, only: Option<&[String]>) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Inputs of the night's plan. Reads and checks the golden protocol.
+/// Inputs of the night's plan. Reads and checks the protocols of its campaigns.
 fn plan_inputs(
     suite: &Suite,
     rig: &RigFile,
@@ -214,20 +215,42 @@ fn plan_inputs(
     let is_selected = |name: &str| only.is_none_or(|o| o.iter().any(|w| w == name));
     let mut inputs = PlanInputs {
         golden: None,
+        reaction: None,
         touch_points: rig.frame.touch_off.as_ref().map(|t| t.points.len()),
     };
     for c in &suite.checks {
-        if let Measure::Golden { protocol } = &c.measure
-            && c.skip.is_none()
-            && is_selected(c.name)
-        {
-            let checked = check::load(protocol, &[])?;
-            inputs.golden = Some(HostDuration::from_secs_f64(
-                checked.plan.summary().duration_s,
-            ));
+        if c.skip.is_some() || !is_selected(c.name) {
+            continue;
+        }
+        match &c.measure {
+            Measure::Golden { protocol } => inputs.golden = Some(duration(protocol, |_| Ok(()))?),
+            Measure::Reaction { protocol } => inputs.reaction = Some(duration(protocol, feels)?),
+            _ => {}
         }
     }
     Ok(inputs)
+}
+
+/// Planned duration of a campaign whose protocol passes `test`.
+fn duration(
+    file: &Path,
+    test: fn(&Protocol) -> Result<(), &'static str>,
+) -> Result<HostDuration, Failure> {
+    let checked = check::load(file, &[])?;
+    test(&checked.protocol).map_err(|why| Failure::input(format!("{}: {why}", file.display())))?;
+    Ok(HostDuration::from_secs_f64(
+        checked.plan.summary().duration_s,
+    ))
+}
+
+/// The check `reaction` needs a protocol that feels.
+fn feels(protocol: &Protocol) -> Result<(), &'static str> {
+    match protocol.online {
+        Some(_) => Ok(()),
+        None => Err(
+            "expected `online` in the protocol of the check `reaction`, found none\n  next: add `online: {}`, or copy hil/reaction.yaml",
+        ),
+    }
 }
 
 /// A night before its first check.

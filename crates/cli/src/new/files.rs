@@ -101,6 +101,7 @@ pub(super) const LAB: &[StarterFile] = &[
     same!("hil/nightly.yaml"),
     same!("hil/first-contact.yaml"),
     same!("hil/golden.yaml"),
+    same!("hil/reaction.yaml"),
     StarterFile::generated(
         "hil/skinrig-suite.schema.json",
         skinrig_protocol::suite_schema_json,

@@ -2,7 +2,6 @@
 
 use skinrig_analysis::result::ClockFit;
 use skinrig_model::CameraId;
-use skinrig_online::Live;
 use skinrig_recorder::{ChunkMeta, RecorderError, SessionReader};
 
 /// Bytes of a packet: at most 16 ms of an idle camera.
@@ -72,11 +71,14 @@ impl<'a> Feed<'a> {
         })
     }
 
-    /// The next packet of the camera that is behind in `live`, host time; `None` when a camera has ended.
-    pub(super) fn next(&mut self, live: &Live) -> Result<Option<Packet<'_>>, RecorderError> {
+    /// The next packet of the camera that is behind in host time, by the newest times of the cameras so far, µs; `None` when a camera
+    /// has ended.
+    pub(super) fn next(
+        &mut self,
+        newest_us: [Option<u64>; 2],
+    ) -> Result<Option<Packet<'_>>, RecorderError> {
         let host_us = |k: usize| {
-            let newest_us = live.newest_us(CameraId::ALL[k]);
-            newest_us.map_or(f64::NEG_INFINITY, |us| {
+            newest_us[k].map_or(f64::NEG_INFINITY, |us| {
                 self.clocks[k].host_us_of_camera(us as f64)
             })
         };

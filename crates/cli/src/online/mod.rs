@@ -14,7 +14,7 @@ use serde_json::json;
 use skinrig_analysis::{Analysis, SessionInput};
 use skinrig_model::{CameraId, StreamFormat};
 use skinrig_online::{
-    Decoders, Detection, Estimate, Felt, Live, SkinModel, StreamSettings, ThresholdError,
+    Decoders, Detection, Estimate, Felt, Live, SkinModel, StreamSettings, Training,
 };
 use skinrig_recorder::SessionReader;
 
@@ -28,6 +28,7 @@ use crate::signals::on_ctrl_c;
 use crate::terminal::Output;
 
 use feed::Feed;
+pub(crate) use offline::Compared;
 use offline::Comparison;
 use summary::{Felts, Quantiles, Sighting, words};
 
@@ -49,8 +50,7 @@ struct Replay {
     until_us: i64,
     stopped: bool,
     speed: Speed,
-    compared: usize,
-    equal: usize,
+    compared: Compared,
 }
 
 fn line(estimate: &Estimate) -> serde_json::Value {
@@ -64,7 +64,7 @@ fn line(estimate: &Estimate) -> serde_json::Value {
     }
 }
 
-fn taught(error: ThresholdError, session: &Path) -> Failure {
+fn taught(error: impl std::fmt::Display, session: &Path) -> Failure {
     Failure::input(format!(
         "{0}: {error}\n  next: `skinrig show {0}` lists what was recorded",
         session.display()
@@ -114,7 +114,8 @@ fn replay(
     let mut estimates: Vec<Estimate> = Vec::new();
     let (start, mut first_us) = (Instant::now(), None);
     while !stop.load(Ordering::Relaxed) {
-        let Some(packet) = feed.next(&live).map_err(Failure::session)? else {
+        let newest = CameraId::ALL.map(|camera| live.newest_us(camera));
+        let Some(packet) = feed.next(newest).map_err(Failure::session)? else {
             break;
         };
         estimates.clear();
@@ -172,8 +173,7 @@ fn replay(
             decision_us: Quantiles::of(decision),
             position_us: Quantiles::of(position),
         },
-        compared: comparison.compared,
-        equal: comparison.equal,
+        compared: comparison.result(),
         found,
         sightings,
     })
@@ -246,8 +246,8 @@ fn print(skin: &SkinModel, stop: StopRule, felts: &Felts, replay: &Replay, rig: 
     }
     outln!(
         "offline   {} of {} press windows give the bits of the analysis",
-        replay.equal,
-        replay.compared
+        replay.compared.equal,
+        replay.compared.windows
     );
     let speed = &replay.speed;
     outln!(
@@ -260,29 +260,61 @@ fn print(skin: &SkinModel, stop: StopRule, felts: &Felts, replay: &Replay, rig: 
     );
 }
 
-/// `skinrig online`.
-///
-/// # Errors
-/// When the session cannot be read or analysed, or has too few calibration presses to learn from.
-pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
-    let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
-    let header = reader.header().map_err(Failure::session)?;
+/// Opens a session that can be replayed, with its analysis.
+fn open_replayable(session: &Path) -> Result<(SessionReader, Analysis), Failure> {
+    let reader = SessionReader::open(session).map_err(Failure::session)?;
     let id = reader.session_id().map_err(Failure::session)?;
-    let (analysis, legs) = analysis_for_tables(&args.session, &reader, &id)?;
+    let (analysis, legs) = analysis_for_tables(session, &reader, &id)?;
     if !legs.is_empty() {
         return Err(Failure::input(format!(
             "{0}: expected a session recorded in one go, found {1} legs\n  next: `skinrig analyze {0}` analyses resumed sessions",
-            args.session.display(),
+            session.display(),
             legs.len() + 1
         )));
     }
     if !analysis.is_valid() {
         return Err(Failure::limit(format!(
             "{0}: expected a valid session, found an INVALID one: {1}\n  next: `skinrig analyze {0}` says what to mend",
-            args.session.display(),
+            session.display(),
             analysis.invalid_because().join("; ")
         )));
     }
+    Ok((reader, analysis))
+}
+
+/// Replays a session as a live source and compares the position at the end of each press window with its analysis.
+///
+/// # Errors
+/// When the session cannot be read or analysed.
+pub(crate) fn compare(session: &Path) -> Result<Compared, Failure> {
+    let (reader, analysis) = open_replayable(session)?;
+    let (aligned, _) = open(session, AnalysisRequest::default())?;
+    let formats = reader.header().map_err(Failure::session)?.stream_formats;
+    let clocks = Training::of(&analysis)
+        .map(|training| *training.clocks())
+        .map_err(|e| taught(e, session))?;
+    let mut decoders = Decoders::new(formats);
+    let mut feed = Feed::open(&reader, clocks).map_err(Failure::session)?;
+    let mut comparison = Comparison::new(&analysis, &aligned.input).map_err(Failure::input)?;
+    loop {
+        let newest = CameraId::ALL.map(|camera| decoders.newest_us(camera));
+        let Some(packet) = feed.next(newest).map_err(Failure::session)? else {
+            return Ok(comparison.result());
+        };
+        if packet.lost > 0 {
+            decoders.lost(packet.camera, packet.lost);
+        }
+        comparison.push(packet.camera, decoders.decode(packet.camera, packet.bytes));
+    }
+}
+
+/// `skinrig online`.
+///
+/// # Errors
+/// When the session cannot be read or analysed, or has too few calibration presses to learn from.
+pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
+    let (reader, analysis) = open_replayable(&args.session)?;
+    let header = reader.header().map_err(Failure::session)?;
     let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
     let skin = learn(args, &analysis)?;
     let both = (&analysis, &aligned.input);
@@ -298,18 +330,18 @@ pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
         let summary = json!({ "summary": {
             "rig": header.rig_name, "threshold": skin.threshold(), "places": skin.places(),
             "felt": felts, "speed": replay.speed, "stopped": replay.stopped,
-            "windows": replay.compared, "windows_equal_to_analysis": replay.equal,
+            "windows": replay.compared.windows, "windows_equal_to_analysis": replay.compared.equal,
         }});
         outln!("{summary}");
     } else {
         print(&skin, args.stop_at, &felts, &replay, &header.rig_name);
     }
-    if replay.equal < replay.compared {
+    if replay.compared.equal < replay.compared.windows {
         return Err(Failure::internal(format!(
             "{}: expected the bits of the analysis in all {} press windows, found them in {}\n  next: analyse the session again, and report this if it stays",
             args.session.display(),
-            replay.compared,
-            replay.equal
+            replay.compared.windows,
+            replay.compared.equal
         )));
     }
     Ok(if replay.stopped {

@@ -13,10 +13,16 @@ pub(super) struct Comparison<'a> {
     windows: std::iter::Peekable<std::vec::IntoIter<[Window; 2]>>,
     open: Option<[Window; 2]>,
     newest_us: [u64; 2],
+    compared: Compared,
+}
+
+/// Press windows of a replay against the analysis.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Compared {
     /// Windows compared,
-    pub(super) compared: usize,
+    pub(crate) windows: usize,
     /// and how many gave the bits of the analysis.
-    pub(super) equal: usize,
+    pub(crate) equal: usize,
 }
 
 impl<'a> Comparison<'a> {
@@ -42,8 +48,7 @@ impl<'a> Comparison<'a> {
             windows: both.into_iter().peekable(),
             open: None,
             newest_us: [0; 2],
-            compared: 0,
-            equal: 0,
+            compared: Compared::default(),
         })
     }
 
@@ -84,7 +89,12 @@ impl<'a> Comparison<'a> {
             && online.outcome == offline.location_outcome
             && region == offline.region
             && extrapolated == offline.extrapolated;
-        self.compared += 1;
-        self.equal += usize::from(equal);
+        self.compared.windows += 1;
+        self.compared.equal += usize::from(equal);
+    }
+
+    /// What was compared so far.
+    pub(super) const fn result(&self) -> Compared {
+        self.compared
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 use skinrig_hil::lease::{Lease, LeaseTiming, Owner};
 
-use crate::support::{Lab, ProgramOutput, files, program, run_to_end, text};
+use crate::support::{Lab, ProgramOutput, ROOT, files, program, run_to_end, text};
 
 const EMULATED: &str = "hil/rigs/emulated.yaml";
 const NIGHTLY: &str = "hil/nightly.yaml";
@@ -60,6 +60,15 @@ fn what_cannot_be_a_night_is_refused_before_it_begins() {
     run(&toothless, &[])
         .code(2)
         .expect_stderr(&["at least one of `data_rate`"]);
+    let golden = text(Path::new(ROOT).join("hil/golden.yaml").as_path());
+    let numb = suite(
+        &lab,
+        "10 min",
+        &format!("  reaction: {{protocol: {golden}, skipped: {{at_most: 0}}}}\n"),
+    );
+    run(&numb, &[])
+        .code(2)
+        .expect_stderr(&["golden.yaml: expected `online`", "next: "]);
     run("no/such/suite.yaml", &[]).code(2);
     assert!(!lab.path("nights").exists());
 }

@@ -304,6 +304,26 @@ checks! {
         lost: Data,
     }
 
+    /// A short campaign that feels its presses while it records.
+    CheckReaction: reaction = "touch felt while recording" => Reaction {
+        /// Its protocol, with `online`, relative to this file.
+        #[setting(example = "reaction.yaml")]
+        protocol: PathBuf,
+    } {
+        /// Share of the scored presses that were felt.
+        felt: Share,
+        /// Median time from measured contact to the run knowing of it.
+        delay: Time,
+        /// Median time from measured contact to the new set point of a press that reacts (`react`).
+        reaction: Time,
+        /// Touches felt between presses.
+        false_alarms: Count,
+        /// Times at which bytes were skipped because the estimator could not keep up.
+        skipped: Count,
+        /// Positions of the session replayed as a live source that differ from its analysis in any bit.
+        differences: Count,
+    }
+
     /// Kills the program that holds the arm in free air; the arm must brake without it.
     CheckWatchdogDrill: watchdog_drill = "watchdog drill" => WatchdogDrill {} {
         /// Time from the kill until the motors are known to be off.

@@ -123,6 +123,11 @@ pub enum Measure {
         /// Its protocol, relative to the suite's folder.
         protocol: PathBuf,
     },
+    /// A short campaign that feels its presses.
+    Reaction {
+        /// Its protocol, relative to the suite's folder.
+        protocol: PathBuf,
+    },
     /// Kills the program that holds the arm.
     WatchdogDrill,
     /// Stops the arm in the middle of a move.

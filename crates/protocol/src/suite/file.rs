@@ -92,7 +92,9 @@ impl Suite {
     /// Resolves paths against the folder of the file.
     fn in_folder(mut self, folder: &Path) -> Self {
         for check in &mut self.checks {
-            if let Measure::Golden { protocol } = &mut check.measure {
+            if let Measure::Golden { protocol } | Measure::Reaction { protocol } =
+                &mut check.measure
+            {
                 *protocol = folder.join(&protocol);
             }
         }

@@ -17,7 +17,7 @@ fn findings(text: &str) -> String {
 fn the_shipped_suite_states_a_limit_for_every_check() {
     let suite = Suite::parse("hil/nightly.yaml", NIGHTLY.as_bytes()).unwrap();
     assert_eq!(suite.budget.as_secs_f64(), 1200.0);
-    assert_eq!(suite.checks.len(), 17);
+    assert_eq!(suite.checks.len(), 18);
     assert_eq!(suite.repeats.at_most, 2);
     let loopback = suite
         .checks

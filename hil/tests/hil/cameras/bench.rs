@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use skinrig_device::CameraSettings;
-use skinrig_hil::bench::{Bench, Devices, DrillResult, GoldenRun, Problem};
+use skinrig_hil::bench::{Bench, CampaignRun, Devices, DrillResult, OnlineComparison, Problem};
 use skinrig_hil::findings::Value;
 use skinrig_hil::{Findings, checks};
 use skinrig_model::{CameraId, HostDuration, SimLevel};
-use skinrig_nightly::{Evidence, EvidenceKind};
+use skinrig_nightly::{Evidence, EvidenceKind, GoldenSession};
 use skinrig_protocol::RigFile;
 use skinrig_protocol::rig::Drill;
 use skinrig_protocol::suite::{Light, Suite};
@@ -152,12 +152,16 @@ impl Bench for SimBench {
         )))
     }
 
-    fn run_golden(&mut self, _protocol: &Path) -> Result<GoldenRun, Problem> {
+    fn run_campaign(&mut self, _protocol: &Path) -> Result<CampaignRun, Problem> {
         Err(Box::new(Evidence::new(
             EvidenceKind::Software,
             "skin",
             "not here",
         )))
+    }
+
+    fn compare_online(&mut self, _: &GoldenSession) -> Result<OnlineComparison, Problem> {
+        panic!("no campaign here")
     }
 
     fn stop_signal(&self) -> Box<dyn Fn() -> bool> {

@@ -5,10 +5,10 @@ use std::path::Path;
 use std::rc::Rc;
 
 use skinrig_device::CameraSettings;
-use skinrig_hil::bench::{Bench, Devices, DrillResult, GoldenRun, Problem};
+use skinrig_hil::bench::{Bench, CampaignRun, Devices, DrillResult, OnlineComparison, Problem};
 use skinrig_hil::{Findings, checks};
 use skinrig_model::{CameraId, HostDuration, SimLevel};
-use skinrig_nightly::{Evidence, EvidenceKind};
+use skinrig_nightly::{Evidence, EvidenceKind, GoldenSession};
 use skinrig_protocol::RigFile;
 use skinrig_protocol::rig::Drill;
 use skinrig_protocol::suite::{Light, Suite};
@@ -101,9 +101,13 @@ impl Bench for SimBench {
         self.drill_result.clone().ok_or_else(|| Box::new(why()))
     }
 
-    fn run_golden(&mut self, _: &Path) -> Result<GoldenRun, Problem> {
+    fn run_campaign(&mut self, _: &Path) -> Result<CampaignRun, Problem> {
         let why = Evidence::new(EvidenceKind::Absent, "robot", "no golden skin here");
         Err(Box::new(why))
+    }
+
+    fn compare_online(&mut self, _: &GoldenSession) -> Result<OnlineComparison, Problem> {
+        panic!("no campaign here")
     }
 
     fn folder(&self) -> &Path {

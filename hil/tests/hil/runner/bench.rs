@@ -7,10 +7,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 
 use skinrig_device::{CameraSettings, Clock};
-use skinrig_hil::bench::{Bench, Devices, DrillResult, GoldenRun, Problem};
+use skinrig_hil::bench::{Bench, CampaignRun, Devices, DrillResult, OnlineComparison, Problem};
 use skinrig_hil::{Findings, NightObserver, SuiteRunner};
 use skinrig_model::{CameraId, HostDuration, HostTime};
-use skinrig_nightly::{Night, NightExit, Verdict, Versions};
+use skinrig_nightly::{GoldenSession, Night, NightExit, Verdict, Versions};
 use skinrig_protocol::RigFile;
 use skinrig_protocol::rig::Drill;
 use skinrig_protocol::suite::{Check, Light, Suite};
@@ -79,7 +79,11 @@ impl Bench for DevicelessBench {
     fn watchdog_drill(&mut self) -> Result<DrillResult, Problem> {
         panic!("a bench without devices")
     }
-    fn run_golden(&mut self, _: &Path) -> Result<GoldenRun, Problem> {
+    fn run_campaign(&mut self, _: &Path) -> Result<CampaignRun, Problem> {
+        panic!("a bench without devices")
+    }
+
+    fn compare_online(&mut self, _: &GoldenSession) -> Result<OnlineComparison, Problem> {
         panic!("a bench without devices")
     }
     fn folder(&self) -> &Path {

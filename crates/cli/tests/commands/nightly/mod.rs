@@ -267,6 +267,39 @@ fn name_the_golden_session() {
     );
 }
 
+/// The campaign of the starter files, a little faster.
+#[test]
+fn presses_are_felt_and_replayed_to_the_bit() {
+    in_real_time(feel_presses);
+}
+
+fn feel_presses() {
+    let Some(nights) = Nights::start() else {
+        return;
+    };
+    let place = |name: &str| nights.folder.path().join(name);
+    let protocol = fs::read_to_string(Path::new(ROOT).join("hil/reaction.yaml")).unwrap();
+    fs::write(
+        place("reaction.yaml"),
+        protocol.replace("period: 2 s", "period: 1.5 s"),
+    )
+    .unwrap();
+    let suite = format!(
+        "{SUITE}  reaction: {{protocol: reaction.yaml, felt: {{at_least: 10 %}}, reaction: {{at_most: 1 s}}, \
+         skipped: {{at_most: 1000}}, differences: {{at_most: 0}}}}\n"
+    );
+    fs::write(place("suite.yaml"), suite).unwrap();
+    let observed = nights.night("reaction");
+    let all = format!("{:#}\n{}", observed.check("reaction"), observed.stderr);
+    for metric in ["felt", "differences"] {
+        assert_eq!(observed.metric_verdict("reaction", "skin", metric), "PASS", "{all}");
+    }
+    let reaction_s = observed.value("reaction", "skin", "reaction").expect(&all);
+    assert!(reaction_s > 0.0, "{all}");
+    // Other campaigns than the golden one are no golden session.
+    assert!(observed.night["golden"].is_null(), "{all}");
+}
+
 /// Broken limits without evidence point at the rig.
 #[test]
 fn unexplained_limit_failures_blame_the_rig() {

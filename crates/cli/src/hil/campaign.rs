@@ -1,10 +1,9 @@
-//! Runs the golden campaign: a protocol through controller, recorder and analysis, in the night's folder.
+//! Runs the campaigns of a suite: a protocol through controller, recorder and analysis, in the night's folder.
 
 use std::path::Path;
 
-use skinrig_hil::findings::Findings;
-use skinrig_hil::{Bench, GoldenRun, Problem};
-use skinrig_hil::{golden_values, run_evidence};
+use skinrig_hil::run_evidence;
+use skinrig_hil::{Bench, CampaignRun, OnlineComparison, Problem};
 use skinrig_model::RunEnd;
 use skinrig_nightly::{Evidence, EvidenceKind, GoldenSession};
 use skinrig_protocol::{Plan, Protocol};
@@ -14,13 +13,13 @@ use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
 use crate::results;
 use crate::rig::{bench, gates};
-use crate::{check, run};
+use crate::{check, online, run};
 
-/// Closes every device and runs the golden campaign.
+/// Closes every device and runs a campaign.
 ///
 /// # Errors
 /// [`Problem`] if nothing was recorded.
-pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Problem> {
+pub(super) fn run(bench: &mut RealBench, file: &Path) -> Result<CampaignRun, Problem> {
     let (protocol, plan) = protocol(bench, file)?;
     let folder = bench.folder().to_owned();
     let rig = bench.take_rig(&protocol)?;
@@ -38,38 +37,55 @@ pub(super) fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Pr
         bench.operator(),
     )
     .map_err(|f| problem(EvidenceKind::Disk, "computer", &f))?;
-    let mut findings = Findings::default();
+    let mut evidence = Vec::new();
     if let RunEnd::Stopped(why) = &report.end
         && !report.end.is_complete()
     {
-        findings.add_evidence(EvidenceKind::TimeOut, "robot", why.to_string());
+        let what = why.to_string();
+        evidence.push(Evidence::new(EvidenceKind::TimeOut, "robot", what));
     }
-    findings.evidence.extend(run_evidence::from_report(&report));
-    let mut golden = GoldenRun {
+    evidence.extend(run_evidence::from_report(&report));
+    let mut campaign = CampaignRun {
         files: GoldenSession {
             session: name(&session),
             report: None,
             results_sha256: None,
         },
         skin: Some(protocol.prototype.id.clone()),
-        analysis_version: skinrig_analysis::result::ANALYSIS_VERSION,
-        findings,
+        analysis: None,
+        lost_bytes: [0; 2],
+        evidence,
     };
     match analyze(&session) {
         Ok((results, html)) => {
-            golden.files.report = Some(html);
-            golden.files.results_sha256 = Some(results.provenance.results_hash.clone());
-            let lost = results.provenance.lost_bytes;
-            golden_values::add(&results.analysis, lost, &mut golden.findings);
+            campaign.files.report = Some(html);
+            campaign.files.results_sha256 = Some(results.provenance.results_hash.clone());
+            campaign.lost_bytes = results.provenance.lost_bytes;
+            campaign.analysis = Some(Box::new(results.analysis));
         }
         Err(failure) => {
-            golden
-                .findings
+            campaign
                 .evidence
-                .push(*problem(EvidenceKind::Audit, "skin", &failure))
+                .push(*problem(EvidenceKind::Audit, "skin", &failure));
         }
     }
-    Ok(golden)
+    Ok(campaign)
+}
+
+/// Replays a session of this night as a live source.
+///
+/// # Errors
+/// [`Problem`] if it cannot be replayed.
+pub(super) fn compare_online(
+    bench: &RealBench,
+    session: &GoldenSession,
+) -> Result<OnlineComparison, Problem> {
+    let path = bench.folder().join(&session.session);
+    let compared = online::compare(&path).map_err(|f| problem(EvidenceKind::Audit, "skin", &f))?;
+    Ok(OnlineComparison {
+        windows: compared.windows,
+        equal: compared.equal,
+    })
 }
 
 /// The protocol, tightened to the limits of the bench, and its plan.
