@@ -6,7 +6,7 @@ mod rigs;
 
 use rayon::prelude::*;
 use rigs::{Random, Session, SessionOptions, session, sound};
-use skinrig_analysis::result::{Fault, Finding, WarningCause};
+use skinrig_analysis::result::{Evidence, Fault, Finding, WarningCause};
 use skinrig_analysis::{Analysis, SessionInput, analyze};
 use skinrig_model::{Causes, HostTime, InvalidReason, Point2, PressFault, PressVerdict};
 
@@ -276,6 +276,98 @@ fn a_camera_that_does_not_see_the_presses() {
             .for_each(|e| (e.x, e.y) = (320, 270));
         s
     });
+}
+
+/// One camera's columns stop to follow, from some press on: the presses were located with columns that are not theirs.
+#[test]
+fn a_camera_that_sticks_on_a_pixel_for_a_part_of_the_session() {
+    let long = SessionOptions {
+        places: 20,
+        ..SessionOptions::default()
+    };
+    for share in [0.0, 0.4, 0.7] {
+        names(Fault::CameraBlind, |seed| {
+            let mut s = session(seed, long);
+            let events = &mut s.events.events[(seed % 2) as usize];
+            let from = (share * events.len() as f64) as usize;
+            let column = [30, 150, 320, 500][(seed % 4) as usize];
+            for e in &mut events[from..] {
+                (e.x, e.y) = (column, 270);
+            }
+            assert!(!run(&s).is_valid(), "seed {seed}");
+            s
+        });
+    }
+}
+
+/// A camera's clock steps half-way: the step is named, and no such session is valid.
+#[test]
+fn a_clock_that_steps() {
+    let line = SessionOptions {
+        line: Some(true),
+        places: 20,
+        ..SessionOptions::default()
+    };
+    for by_us in [-450_000, 450_000] {
+        let all: Vec<Analysis> = (0..SEEDS)
+            .into_par_iter()
+            .map(|seed| run(&stepped(seed, line, by_us)))
+            .collect();
+        let is_step = |a: &&Analysis| {
+            let of_this_size = |f: &Finding| match f.evidence {
+                Evidence::MarksStep { step_ms, .. } => (step_ms - by_us as f64 * 1e-3).abs() < 1.0,
+                _ => false,
+            };
+            !a.is_valid() && a.findings.iter().any(of_this_size)
+        };
+        let named = all.iter().filter(is_step).count() as u64;
+        let else_named: Vec<_> = all
+            .iter()
+            .filter(|a| !is_step(a))
+            .map(|a| (a.is_valid(), &a.findings))
+            .collect();
+        assert!(
+            20 * named >= 19 * SEEDS,
+            "{named} of {SEEDS}, else {else_named:#?}"
+        );
+    }
+    // Without marks, the presses of one side may align instead.
+    let rates = SessionOptions {
+        line: Some(false),
+        ..line
+    };
+    for by_us in [-450_000, 450_000] {
+        let valid: Vec<_> = (0..SEEDS)
+            .into_par_iter()
+            .map(|seed| (seed, run(&stepped(seed, rates, by_us))))
+            .filter(|(_, a)| a.is_valid())
+            .map(|(seed, a)| (seed, a.findings))
+            .collect();
+        // Weak bursts may align one side alone: never silently.
+        let silent = valid.iter().any(|(_, findings)| findings.is_empty());
+        assert!(valid.len() <= 1 && !silent, "{valid:#?}");
+    }
+}
+
+/// A session in which the clock of one camera steps half-way: its events and its trigger edges.
+fn stepped(seed: u64, options: SessionOptions, by_us: i64) -> Session {
+    let mut s = session(seed, options);
+    let k = (seed % 2) as usize;
+    let events = &mut s.events.events[k];
+    let from_us = events[events.len() / 2].t_us;
+    let step = |t_us: u64| {
+        if t_us < from_us {
+            t_us
+        } else {
+            t_us.wrapping_add_signed(by_us)
+        }
+    };
+    events.iter_mut().for_each(|e| e.t_us = step(e.t_us));
+    events.sort_by_key(|e| e.t_us);
+    let edges = &mut s.input.edges[k];
+    edges.iter_mut().for_each(|e| e.t_us = step(e.t_us));
+    edges.sort_by_key(|e| e.t_us);
+    s
 }
 
 #[test]

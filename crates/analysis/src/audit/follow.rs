@@ -7,8 +7,9 @@
 use skinrig_model::{CameraId, Point2};
 
 use super::finding::finding;
+use super::fixed_pixel;
 use super::observed_press::ObservedPress;
-use super::readings::{Path, Reading, ScoredReading};
+use super::readings::{MIN_SPREAD_DEG, Path, Reading, ScoredReading};
 use super::resection::{residuals, spread_deg};
 use super::segments::shifted_rest;
 use super::statistics::median;
@@ -27,10 +28,6 @@ const MANY_PLACES: usize = 6;
 /// Distance from the nominal camera worth a finding: four standard deviations of the prior, mm and degrees.
 const FAR_MM: f64 = 20.0;
 const FAR_DEG: f64 = 10.0;
-/// Median scatter of the columns of a fixed pixel, px.
-const FIXED_PX: f64 = 2.0;
-/// Median scatter of the angles above which columns must move, degrees.
-const MIN_SPREAD_DEG: f64 = 5.0;
 /// Two streams are identical if their columns differ by less than this, px, at this share of the presses.
 const SAME_PX: f64 = 0.5;
 const SAME_SHARE: f64 = 0.9;
@@ -43,9 +40,9 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
         return Vec::new();
     }
     if path.places >= MANY_PLACES {
-        let fixed = CameraId::ALL.map(|camera| fixed_pixel(&path, camera));
-        if let Some(finding) = on_a_fixed_pixel(fixed) {
-            return vec![finding];
+        let fixed = fixed_pixel::findings(&path);
+        if !fixed.is_empty() {
+            return fixed;
         }
     }
     if let Some(finding) = one_camera_twice(presses_seen) {
@@ -268,45 +265,4 @@ fn far_off(as_is: &ScoredReading<'_>, camera: CameraId) -> Option<Finding> {
             evidence,
         )
     })
-}
-
-/// Detects that all centroids of a camera are on one pixel although the presses are not: median column, and median scatter
-/// of the columns (px) and the angles (degrees).
-fn fixed_pixel(path: &Path<'_>, camera: CameraId) -> Option<[f64; 3]> {
-    let drawn = &path.rig.nominal.cameras[camera.index()];
-    let sights = columns(path, &path.as_it_is(), camera.index());
-    if sights.len() < MANY_PLACES {
-        return None;
-    }
-    let spread = |values: Vec<f64>| {
-        let middle = median(values.clone())?;
-        let spread = median(values.iter().map(|v| (v - middle).abs()).collect())?;
-        Some((middle, spread))
-    };
-    let (column, columns) = spread(sights.iter().map(|c| c.0).collect())?;
-    let (_, angles) = spread(
-        sights
-            .iter()
-            .map(|c| drawn.angle_of_point_deg(c.1))
-            .collect(),
-    )?;
-    (columns < FIXED_PX && angles > MIN_SPREAD_DEG).then_some([column, columns, angles])
-}
-
-fn on_a_fixed_pixel(fixed: [Option<[f64; 3]>; 2]) -> Option<Finding> {
-    let (camera, [column, columns, angles], both) = match fixed {
-        [None, None] => return None,
-        [Some(one), None] => (Some(CameraId::One), one, false),
-        [None, Some(two)] => (Some(CameraId::Two), two, false),
-        [Some(one), Some(_)] => (None, one, true),
-    };
-    let evidence = Evidence::FixedColumn {
-        camera: camera.unwrap_or(CameraId::One),
-        within_px: columns,
-        column_px: column,
-        angle_deg: angles,
-        both,
-    };
-    let law = Law::CentroidFollowsPosition;
-    Some(finding(law, Fault::CameraBlind, camera, evidence))
 }

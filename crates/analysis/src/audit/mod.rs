@@ -6,13 +6,16 @@
 mod advice;
 mod blind_guess;
 mod burst;
+mod clock_step;
 mod commanded;
 mod complete;
 mod drift;
 mod finding;
+mod fixed_pixel;
 mod follow;
 mod frames;
 mod height;
+mod mark_step;
 mod observed_press;
 mod order;
 mod pattern;
@@ -64,6 +67,12 @@ pub(crate) fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams
             streams.contacts_s.each_ref().map(Vec::as_slice),
         ),
         burst::findings(analysis, &presses_seen),
+        mark_step::findings(input),
+        clock_step::findings(
+            &presses_seen,
+            streams.contacts_s.each_ref().map(Vec::as_slice),
+            analysis.clocks,
+        ),
         whole_presses::findings(
             &presses_seen,
             streams.contacts_s.each_ref().map(Vec::as_slice),

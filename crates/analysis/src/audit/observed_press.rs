@@ -43,6 +43,8 @@ pub(crate) struct ObservedPress<'a> {
 pub(crate) struct CameraObservation {
     /// Centroid column of a significant press, px.
     pub column: Option<f64>,
+    /// Centroid column of any press, px: the analysis locates with it.
+    pub centroid: Option<f64>,
     /// Events in the window above the idle prediction, in standard errors; `None` if unknown, or if the press is at the edge
     /// of the nominal field of view or outside it.
     pub response: Option<f64>,
@@ -112,6 +114,7 @@ fn sight(input: &SessionInput, view: Option<PressView>, visible: bool) -> Camera
     let Some(view) = view else {
         return CameraObservation {
             column: None,
+            centroid: None,
             response: None,
             rates: None,
         };
@@ -128,8 +131,10 @@ fn sight(input: &SessionInput, view: Option<PressView>, visible: bool) -> Camera
     };
     let strong = view.cluster_events >= input.settings.min_cluster_events
         && response.is_none_or(|r| r > RESPONSE_SIGMAS);
+    let centroid = view.centroid_u.filter(|u| u.is_finite());
     CameraObservation {
-        column: view.centroid_u.filter(|u| u.is_finite() && strong),
+        column: centroid.filter(|_| strong),
+        centroid,
         response: response.filter(|_| visible),
         rates,
     }

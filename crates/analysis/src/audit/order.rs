@@ -1,15 +1,20 @@
 //! Decides which findings follow from others, and which comes first.
 
-use crate::result::{Fault, Finding, Law};
+use crate::result::{Evidence, Fault, Finding, Law};
 
-/// Drops findings that follow from a more certain one; the most certain comes first.
+/// Drops findings that follow from a more certain one, which invalidates if any of them does; the most certain comes first.
 pub(crate) fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
     found.sort_by_key(|f| (place(f), !f.invalidates));
     let mut reported: Vec<Finding> = Vec::new();
     for finding in found {
         let repeats = |k: &Finding| k.fault == finding.fault && k.camera == finding.camera;
-        if !reported.iter().any(|k| repeats(k) || explains(k, &finding)) {
-            reported.push(finding);
+        match reported
+            .iter_mut()
+            .find(|k| repeats(k) || explains(k, &finding))
+        {
+            // Whatever makes the numbers unusable still does.
+            Some(cause) => cause.invalidates |= finding.invalidates,
+            None => reported.push(finding),
         }
     }
     reported
@@ -50,7 +55,9 @@ fn place(finding: &Finding) -> u8 {
 
 /// True if the bursts of one camera come at the times of other presses.
 fn is_seen_in_bursts(finding: &Finding) -> bool {
-    finding.law == Law::BurstWithMotion && finding.camera.is_some()
+    finding.law == Law::BurstWithMotion
+        && (finding.camera.is_some() || matches!(finding.evidence, Evidence::ClockStep { .. }))
+        || matches!(finding.evidence, Evidence::MarksStep { .. })
 }
 
 /// True if `a` implies `b`.
@@ -127,6 +134,7 @@ fn explains(a: &Finding, b: &Finding) -> bool {
                     b.fault,
                     Fault::PressesMissing
                         | Fault::CameraBlind
+                        | Fault::NoTriggers
                         | Fault::IndexShifted
                         | Fault::HeightOff
                         | Fault::RobotOff

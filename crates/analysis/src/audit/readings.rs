@@ -16,6 +16,8 @@ use crate::result::{Fault, OtherReading};
 
 /// Maximum number of presses for the comparison; of more, every n-th is used.
 const MAX_PRESSES: usize = 600;
+/// Median scatter of the angles above which columns must move, degrees.
+pub(super) const MIN_SPREAD_DEG: f64 = 5.0;
 /// Largest shift of the press list to consider.
 pub(crate) const MAX_SHIFT: i32 = 5;
 /// Cost of a fitted displacement, nats: two free parameters anywhere on the skin.

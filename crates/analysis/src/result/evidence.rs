@@ -288,6 +288,49 @@ pub enum Evidence {
         /// Bursts.
         bursts: usize,
     },
+    /// A camera's clock steps within the session.
+    #[error(
+        "expected the clock of {camera} to run evenly, found it step by about {step_s:+.1} s between {last} and {first}, at \
+         {at_s:.0} s: with the step {explained} of {presses} presses have a burst, without it {one_offset}{}",
+        if *.both { "; the other camera likewise" } else { "" }
+    )]
+    ClockStep {
+        /// The camera with these numbers.
+        camera: CameraId,
+        /// True if the other camera likewise.
+        both: bool,
+        /// Last press before the step.
+        last: PressId,
+        /// First press after it.
+        first: PressId,
+        /// Contact of that press on the host clock, s.
+        at_s: f64,
+        /// Size, s, known up to whole periods of the presses; positive if later events have later times.
+        step_s: f64,
+        /// Presses with a burst at the offset of their side of the step.
+        explained: usize,
+        /// Presses with a burst at the best single offset.
+        one_offset: usize,
+        /// Presses.
+        presses: usize,
+    },
+    /// A camera's clock steps between two trigger marks.
+    #[error(
+        "expected the clock of {camera} to run evenly, found it step by {step_ms:+.1} ms between the trigger marks at \
+         {from_s:.1} s and {to_s:.1} s (n {marks} marks)"
+    )]
+    MarksStep {
+        /// The camera.
+        camera: CameraId,
+        /// Size, ms; positive if later events have later times.
+        step_ms: f64,
+        /// Last mark before the step on the host clock, s.
+        from_s: f64,
+        /// First mark after it, s.
+        to_s: f64,
+        /// Marks compared.
+        marks: usize,
+    },
     /// Both cameras see the same columns.
     #[error(
         "expected different columns in the two cameras, found the same column, within {within_px} px, in {same} of \
@@ -396,6 +439,25 @@ pub enum Evidence {
         angle_deg: f64,
         /// True if the other camera likewise.
         both: bool,
+    },
+    /// The columns of a camera do not move for a part of the session.
+    #[error(
+        "expected columns that move with the presses, found them at column {column_px:.0} from {first} to {last} while the \
+         viewing angle scatters by {angle_deg:.0} degrees ({camera}, n {presses} presses)"
+    )]
+    FixedStretch {
+        /// The camera.
+        camera: CameraId,
+        /// First press.
+        first: PressId,
+        /// Last press.
+        last: PressId,
+        /// The column, px.
+        column_px: f64,
+        /// Scatter of the viewing angles of these presses, degrees.
+        angle_deg: f64,
+        /// Presses with a centroid from the first to the last one.
+        presses: usize,
     },
     /// All centroids moved in a repetition.
     #[error(
