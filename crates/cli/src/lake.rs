@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use chrono::{DateTime, Utc};
 use skinrig_analysis::ANALYSIS_VERSION;
-use skinrig_export::{Lake, LakeCommit, Partition, Source};
+use skinrig_export::{Lake, LakeCommit, LakeState, Partition, Source};
 use skinrig_model::RunHeader;
 use skinrig_recorder::{SessionReader, list};
 
@@ -17,12 +17,14 @@ use crate::results;
 /// What became of a session.
 enum Added {
     Now,
+    /// It was there, but this file was missing or damaged.
+    Again(PathBuf),
     IsThere,
     /// Not added, and why.
     LeftOut(String),
 }
 
-/// Adds each session that is not there yet.
+/// Adds each session that is not there yet, and writes damaged ones again.
 ///
 /// # Errors
 /// [`Failure::limit`] if a session is not sealed or INVALID, after all others; [`Failure::input`] for one that cannot be read, or
@@ -30,12 +32,18 @@ enum Added {
 pub(crate) fn lake(args: &LakeArgs, json: bool) -> Outcome {
     let lake = Lake::new(&args.to);
     let mut rows = Vec::new();
-    let (mut added, mut there, mut left_out) = (0, 0, 0);
+    let (mut added, mut mended, mut there, mut left_out) = (0, 0, 0, 0);
     for path in files(&args.sessions)? {
         let (state, why) = match add(&lake, &path)? {
             Added::Now => {
                 added += 1;
                 ("added", None)
+            }
+            Added::Again(damaged) => {
+                mended += 1;
+                let why = format!("{} was missing or damaged", damaged.display());
+                errln!("{}: written again: {why}", path.display());
+                ("written_again", Some(why))
             }
             Added::IsThere => {
                 there += 1;
@@ -52,8 +60,12 @@ pub(crate) fn lake(args: &LakeArgs, json: bool) -> Outcome {
     if json {
         crate::terminal::print_json(&serde_json::json!({ "lake": args.to, "sessions": rows }));
     } else {
+        let again = match mended {
+            0 => String::new(),
+            n => format!("{n} damaged ones written again, "),
+        };
         outln!(
-            "{}: {added} sessions added, {there} already there",
+            "{}: {added} sessions added, {again}{there} already there",
             args.to.display()
         );
     }
@@ -96,7 +108,8 @@ fn add(lake: &Lake, path: &Path) -> Result<Added, Failure> {
         content_sha256: seal.content_sha256(),
         partition: partition(path, &header)?,
     };
-    if lake.has(&commit).map_err(export::refused)? {
+    let state = lake.state(&commit).map_err(export::refused)?;
+    if state == LakeState::Whole {
         return Ok(Added::IsThere);
     }
     let results = results::analyze_shown(path, AnalysisRequest::default())?;
@@ -109,7 +122,10 @@ fn add(lake: &Lake, path: &Path) -> Result<Added, Failure> {
         analysis: Some((&results.analysis, &results.legs)),
     };
     lake.add(&source, &commit).map_err(export::refused)?;
-    Ok(Added::Now)
+    Ok(match state {
+        LakeState::Damaged(file) => Added::Again(file),
+        LakeState::Absent | LakeState::Whole => Added::Now,
+    })
 }
 
 fn partition(path: &Path, header: &RunHeader) -> Result<Partition, Failure> {

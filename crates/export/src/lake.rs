@@ -1,13 +1,16 @@
 //! Owns the data lake: a Parquet dataset of many sessions in hive partitions, to which sessions are only added.
 //!
 //! `TABLE/analysis=N/prototype=P/bench=B/day=D/SESSION.parquet` has the rows of one session. All tables of a session are written
-//! aside and renamed; its commit, the last file, makes it part of the lake. Adding a session again changes nothing.
+//! aside and renamed; its commit, the last file, makes it part of the lake and has their hashes.
+//! Adding a session again changes nothing, unless one of its tables is damaged.
 
+use std::collections::BTreeMap;
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::error::ExportError;
 use crate::folder::Folder;
@@ -41,6 +44,27 @@ pub struct LakeCommit {
     pub content_sha256: String,
     /// Its partition.
     pub partition: Partition,
+}
+
+/// A commit as stored: the session and its tables.
+#[derive(Debug, Serialize, Deserialize)]
+struct StoredCommit {
+    #[serde(flatten)]
+    session: LakeCommit,
+    /// SHA-256 of each table's file, lower-case hex.
+    #[serde(default)]
+    tables_sha256: BTreeMap<String, String>,
+}
+
+/// What a lake has of a session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LakeState {
+    /// Nothing.
+    Absent,
+    /// All of its tables, as they were written.
+    Whole,
+    /// A commit, but this table is missing or not as it was written.
+    Damaged(PathBuf),
 }
 
 /// A Parquet dataset of sessions.
@@ -78,34 +102,44 @@ impl Lake {
         }
     }
 
-    /// True if the lake has the session with this analysis.
+    /// What the lake has of the session with this analysis. Reads the tables that the commit names.
     ///
     /// # Errors
-    /// [`ExportError::OtherContent`] if it has the session with another content; [`ExportError::File`] when a commit cannot be read.
-    pub fn has(&self, commit: &LakeCommit) -> Result<bool, ExportError> {
+    /// [`ExportError::OtherContent`] if it has the session with another content; [`ExportError::File`] when a commit or a table
+    /// cannot be read.
+    pub fn state(&self, commit: &LakeCommit) -> Result<LakeState, ExportError> {
         let path = self.commit_path(commit);
         let text = match fs::read(&path) {
             Ok(text) => text,
-            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(LakeState::Absent),
             Err(e) => return Err(ExportError::file(&path)(e)),
         };
-        let found: LakeCommit = serde_json::from_slice(&text).map_err(ExportError::file(&path))?;
-        if found == *commit {
-            return Ok(true);
+        let Ok(found) = serde_json::from_slice::<StoredCommit>(&text) else {
+            return Ok(LakeState::Damaged(path));
+        };
+        if found.session != *commit {
+            return Err(ExportError::OtherContent {
+                path,
+                session_id: commit.session_id.clone(),
+            });
         }
-        Err(ExportError::OtherContent {
-            path,
-            session_id: commit.session_id.clone(),
-        })
+        for table in TABLES {
+            let file = self.table_path(table, commit);
+            let expected = found.tables_sha256.get(table);
+            if expected.is_none() || expected != sha256_of(&file)?.as_ref() {
+                return Ok(LakeState::Damaged(file));
+            }
+        }
+        Ok(LakeState::Whole)
     }
 
-    /// Adds a session, whose analysis `source` has, if it is not there.
+    /// Adds a session, whose analysis `source` has, if it is not there; a damaged one is written again.
     ///
     /// # Errors
-    /// As [`Lake::has`]; when the session cannot be read or a file cannot be written. Then the session is not part of the lake, and
+    /// As [`Lake::state`]; when the session cannot be read or a file cannot be written. Then the session is not part of the lake, and
     /// can be added again.
     pub fn add(&self, source: &Source<'_>, commit: &LakeCommit) -> Result<(), ExportError> {
-        if self.has(commit)? {
+        if self.state(commit)? == LakeState::Whole {
             return Ok(());
         }
         let staging = self.staging()?;
@@ -126,17 +160,24 @@ impl Lake {
         for table in [TableName::Presses, TableName::Results, TableName::Pose] {
             source.write(table, &mut tables)?;
         }
+        let mut tables_sha256 = BTreeMap::new();
         for table in TABLES {
-            let to = self.root.join(table).join(commit.partition.path());
-            fs::create_dir_all(&to).map_err(ExportError::file(&to))?;
-            let to = to.join(format!("{}.parquet", commit.session_id));
+            let to = self.table_path(table, commit);
+            if let Some(folder) = to.parent() {
+                fs::create_dir_all(folder).map_err(ExportError::file(folder))?;
+            }
             let from = folder.file(&format!(".{table}.parquet"));
+            tables_sha256.extend(sha256_of(&from)?.map(|hash| (table.to_owned(), hash)));
             fs::rename(&from, &to).map_err(ExportError::file(&to))?;
         }
         let to = self.commit_path(commit);
         let commits = self.root.join(COMMITS);
         fs::create_dir_all(&commits).map_err(ExportError::file(&commits))?;
-        let text = serde_json::to_vec_pretty(commit).map_err(ExportError::file(&to))?;
+        let stored = StoredCommit {
+            session: commit.clone(),
+            tables_sha256,
+        };
+        let text = serde_json::to_vec_pretty(&stored).map_err(ExportError::file(&to))?;
         folder.write_atomic(".commit", |path| {
             fs::write(path, &text).map_err(ExportError::file(path))
         })?;
@@ -158,12 +199,36 @@ impl Lake {
         }
     }
 
+    fn table_path(&self, table: &str, commit: &LakeCommit) -> PathBuf {
+        let folder = self.root.join(table).join(commit.partition.path());
+        folder.join(format!("{}.parquet", commit.session_id))
+    }
+
     fn commit_path(&self, commit: &LakeCommit) -> PathBuf {
         let (id, version) = (&commit.session_id, commit.partition.analysis);
         self.root
             .join(COMMITS)
             .join(format!("{id}.analysis-{version}.json"))
     }
+}
+
+/// SHA-256 of a file in lower-case hex; `None` if it does not exist.
+fn sha256_of(path: &Path) -> Result<Option<String>, ExportError> {
+    let mut file = match fs::File::open(path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(ExportError::file(path)(e)),
+    };
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 18];
+    loop {
+        match file.read(&mut buffer).map_err(ExportError::file(path))? {
+            0 => break,
+            n => hash.update(&buffer[..n]),
+        }
+    }
+    let hex = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    Ok(Some(hex))
 }
 
 /// A partition's value as the name of a folder: every byte but letters, digits and `-._` as `%XX`, which readers of hive

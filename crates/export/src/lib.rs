@@ -31,7 +31,7 @@ pub use cameras::{write_hdf5, write_raw};
 pub use csv_files::CsvFiles;
 pub use error::ExportError;
 pub use folder::{Folder, same_bytes};
-pub use lake::{Lake, LakeCommit, Partition};
+pub use lake::{Lake, LakeCommit, LakeState, Partition};
 pub use metrics::{MetricRow, metric_rows};
 pub use npz::NpzFile;
 pub use parquet_files::ParquetFiles;

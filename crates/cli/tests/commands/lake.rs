@@ -77,6 +77,33 @@ fn a_session_is_added_once_and_other_programs_read_it() {
     );
     assert!(content(&lab.path("lake")) == before);
 
+    // A commit whose table is gone, cut off or changed, and a commit that is cut off itself.
+    let bytes = std::fs::read(table).unwrap();
+    let mut flipped = bytes.clone();
+    flipped[bytes.len() / 2] ^= 1;
+    for damaged in [None, Some(&bytes[..bytes.len() / 2]), Some(&flipped[..])] {
+        match damaged {
+            None => std::fs::remove_file(table).unwrap(),
+            Some(damaged) => std::fs::write(table, damaged).unwrap(),
+        }
+        let mended = add()
+            .code(0)
+            .expect_stderr(&["written again", ".parquet was missing or damaged"]);
+        assert!(
+            mended
+                .out
+                .contains("0 sessions added, 1 damaged ones written again, 2 already there"),
+            "{mended:#?}"
+        );
+        assert!(content(&lab.path("lake")) == before);
+    }
+    let commit = std::fs::read(&commits[0]).unwrap();
+    std::fs::write(&commits[0], &commit[..commit.len() / 2]).unwrap();
+    add()
+        .code(0)
+        .expect_stderr(&["written again", ".json was missing or damaged"]);
+    assert!(content(&lab.path("lake")) == before);
+
     if let Ok(python) = std::env::var("SKINRIG_PYTHON") {
         let mut read = Command::new(python);
         read.arg(format!(
