@@ -101,7 +101,7 @@ pub(crate) fn conclude(
 /// How the run of `session` ended: the message for a stop by the operator, `None` for success.
 ///
 /// # Errors
-/// [`Failure::rig`] for a fault, and for presses lost to rig faults.
+/// [`Failure::rig`] for a fault, for presses lost to rig faults, and for a device that failed at the end.
 pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String>, Failure> {
     let kept_message = format!("everything recorded so far is kept: {}", session.display());
     match &report.end {
@@ -112,7 +112,14 @@ pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String
             with `skinrig resume {0}`",
                 session.display()
             ))),
-            None => Ok(None),
+            None => match device_problem(session, report)? {
+                Some(problem) => Err(Failure::rig(format!(
+                    "{problem}\n  all presses of the plan are done, and the session is kept: {}\n  next: check that device before \
+                     the next run; `skinrig show {0}` lists what was kept",
+                    session.display()
+                ))),
+                None => Ok(None),
+            },
         },
         RunEnd::Stopped(reason) => Ok(Some(format!(
             "stopped: {reason}; {kept_message}\n  next: {}",
@@ -124,6 +131,20 @@ pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String
             next_step(session)
         ))),
     }
+}
+
+/// A device of a rig that failed at the end of the run. A file of an import or replay is not a device.
+fn device_problem<'a>(
+    session: &Path,
+    report: &'a RunReport,
+) -> Result<Option<&'a Problem>, Failure> {
+    let is_of_a_device = |p: &&Problem| matches!(p.error, RunFault::Device(_));
+    let Some(problem) = report.problems.iter().find(is_of_a_device) else {
+        return Ok(None);
+    };
+    let reader = SessionReader::open(session).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
+    Ok(header.is_of_a_rig().then_some(problem))
 }
 
 /// Lists the presses of a completed session that were lost to the rig or the operator; `None` if there are none, or if no rig can

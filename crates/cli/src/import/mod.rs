@@ -129,9 +129,13 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
         .faults()
         .iter()
         .any(|c| matches!(c, RunFault::Device(_)));
-    let concluded = conclude(&session, &report, args.no_analysis, None, output);
     let is_of_a_file = |p: &&Problem| matches!(p.error, RunFault::Device(_));
-    if let (false, Some(problem)) = (unreadable, report.problems.iter().find(is_of_a_file)) {
+    let unread = report.problems.iter().find(is_of_a_file);
+    if (unreadable || unread.is_some()) && !output.json && !args.no_analysis {
+        outln!("DAMAGED   a file was not read to its end: what follows is of the part before");
+    }
+    let concluded = conclude(&session, &report, args.no_analysis, None, output);
+    if let (false, Some(problem)) = (unreadable, unread) {
         // All presses have what they need, but a file was not read to its end.
         if let Err(failure) = concluded {
             errln!("{}", failure.message);
