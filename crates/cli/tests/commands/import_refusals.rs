@@ -122,6 +122,7 @@ fn nan_times_and_times_that_go_back_are_rejected() {
         output.err.contains("kept"),
         "says that a part is kept: {output:?}"
     );
+    leads_with_damage(&output.out);
     // The events before are kept and reported as partial.
     let sessions = files(&lab.path("s"), ".session.sqlite");
     assert_eq!(sessions.len(), 1);
@@ -142,6 +143,17 @@ fn a_recording_that_goes_on_for_days_is_not_read_to_its_end() {
     for part in ["camera2.hdf5", "goes on", "unit of the format", "kept"] {
         assert!(output.err.contains(part), "{part}: {output:?}");
     }
+    leads_with_damage(&output.out);
+}
+
+/// The answer of a damaged file must not lead with numbers.
+fn leads_with_damage(out: &str) {
+    let at = |text: &str| out.find(text).unwrap_or_else(|| panic!("{text}: {out}"));
+    assert!(at("DAMAGED") < at("presses  "), "{out}");
+    assert!(
+        out.find("RMSE").is_none_or(|rmse| at("DAMAGED") < rmse),
+        "{out}"
+    );
 }
 
 #[test]
