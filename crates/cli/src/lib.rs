@@ -38,6 +38,7 @@ mod progress;
 mod prototypes;
 mod provenance;
 mod publish;
+mod reanalyze;
 mod recording;
 mod remote;
 pub mod results;
@@ -140,6 +141,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Sessions(a) => sessions::sessions(a, json),
         Command::Show(a) => show::show(a, json),
         Command::Analyze(a) => analyze::analyze(a, output),
+        Command::Reanalyze(a) => reanalyze::reanalyze(a, output),
         Command::Report(a) => analyze::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, output),
@@ -160,6 +162,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Man(a) => man::man(a, json),
         Command::TakeLook(a) => looks::take_look(a),
         Command::LearnSkin(a) => sense::learn_skin(a),
+        Command::AnalyzeRequest => reanalyze::analyze_request(),
         Command::SuperviseArm => supervise::supervise(),
         Command::HoldArm(a) => hil::hold::hold(a),
     }

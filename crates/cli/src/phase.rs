@@ -43,6 +43,22 @@ impl Phase {
         phase
     }
 
+    /// Like [`Self::steps`], with a bar.
+    pub(crate) fn bar(text: &str, count: u32) -> Self {
+        let phase = Self::draw(
+            text,
+            "{spinner} {msg} {bar:20} {pos} of {len}, {elapsed}",
+            |style| style,
+        );
+        phase.0.set_length(u64::from(count));
+        phase
+    }
+
+    /// Prints lines above the phase.
+    pub(crate) fn above(&self, print: impl FnOnce()) {
+        self.0.suspend(print);
+    }
+
     /// Shows that `finished` steps are done.
     pub(crate) fn step(&self, finished: u32) {
         self.0.set_position(u64::from(finished));

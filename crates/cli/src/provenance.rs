@@ -77,6 +77,7 @@ pub(crate) fn provenance(
     let origin = Origin::of(header);
     Ok(Provenance {
         session_id: reader.session_id()?,
+        content_sha256: reader.seal()?.map(|seal| seal.content_sha256()),
         started: header.started_at.clone(),
         prototype: header.prototype.clone(),
         operator: header.operator.clone(),

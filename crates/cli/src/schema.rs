@@ -15,6 +15,7 @@ pub(crate) fn schema(args: &SchemaArgs) -> Outcome {
         SchemaKind::Limits => skinrig_protocol::limits_schema_json(),
         SchemaKind::Selection => skinrig_protocol::selection_schema_json(),
         SchemaKind::Publication => skinrig_protocol::publication_schema_json(),
+        SchemaKind::Settings => skinrig_protocol::new_settings_schema_json(),
         SchemaKind::Suite => skinrig_protocol::suite_schema_json(),
     };
     crate::terminal::out(format_args!("{schema}"));

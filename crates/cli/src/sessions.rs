@@ -183,7 +183,8 @@ pub(crate) fn copies(all: &[SessionSummary]) -> Vec<String> {
     notes
 }
 
-fn none_in(folder: &Path) -> Failure {
+/// The folder has no session.
+pub(crate) fn none_in(folder: &Path) -> Failure {
     Failure::input(format!(
         "{}: expected a session, found none\n  next: `skinrig run` records one; name another folder or a file",
         folder.display()

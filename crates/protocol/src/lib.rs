@@ -8,9 +8,9 @@
 //!
 //! [`Schedule`] describes a recording made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] the margins
 //! of a comparison; [`Selection`] the sessions and presses of a result; [`Publication`] what published data
-//! state; [`Suite`] the checks of a bench. The settings structs declare the keys of each
+//! state; [`NewSettings`] other settings of analyses; [`Suite`] the checks of a bench. The settings structs declare the keys of each
 //! language and yield its JSON Schema ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`],
-//! [`selection_schema_json`], [`publication_schema_json`], [`suite_schema_json`]).
+//! [`selection_schema_json`], [`publication_schema_json`], [`new_settings_schema_json`], [`suite_schema_json`]).
 
 pub mod area;
 mod assemble;
@@ -22,6 +22,7 @@ mod file;
 mod findings;
 mod keys;
 pub mod limits;
+mod new_settings;
 pub mod notify;
 pub mod online;
 mod path;
@@ -50,6 +51,7 @@ pub use check::{PlanRule, Segment, Violation, check};
 pub use design::best_locations;
 pub use faults::{FaultPhase, FaultTime, InvalidFault, PlantedFault};
 pub use limits::Limits;
+pub use new_settings::NewSettings;
 pub use notify::Notify;
 pub use online::{Online, React};
 pub use phases::PressPhases;
@@ -62,8 +64,8 @@ pub use retakes::Retakes;
 pub use rig::{RigFile, RigKind};
 pub use schedule::Schedule;
 pub use schema::{
-    limits_schema_json, publication_schema_json, rig_schema_json, schedule_schema_json,
-    schema_json, selection_schema_json, setting_doc, suite_schema_json,
+    limits_schema_json, new_settings_schema_json, publication_schema_json, rig_schema_json,
+    schedule_schema_json, schema_json, selection_schema_json, setting_doc, suite_schema_json,
 };
 pub use selection::Selection;
 pub use skinrig_settings::{Diagnostic, Diagnostics, Location};

@@ -44,6 +44,12 @@ pub fn publication_schema_json() -> String {
     )
 }
 
+/// The JSON Schema of settings for `skinrig reanalyze --settings`.
+#[must_use]
+pub fn new_settings_schema_json() -> String {
+    render(crate::new_settings::NewSettings::TABLE, "skinrig settings")
+}
+
 /// The JSON Schema of a suite for `skinrig hil run`.
 #[must_use]
 pub fn suite_schema_json() -> String {

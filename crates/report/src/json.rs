@@ -23,6 +23,9 @@ const BULK: [&str; 5] = ["rates", "pictures", "zooms", "activity", "motion"];
 pub struct Summary {
     /// Unique ID of the session.
     pub session_id: String,
+    /// Hash of the session's content, of its seal; `None` without a seal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub content_sha256: Option<String>,
     /// Version of the analysis.
     pub analysis_version: u32,
     /// Hash of the result.
@@ -57,6 +60,7 @@ impl Summary {
         let (analysis, scored) = (input.analysis, &input.analysis.scored);
         Self {
             session_id: input.provenance.session_id.clone(),
+            content_sha256: input.provenance.content_sha256.clone(),
             analysis_version: analysis.version,
             variant: input.provenance.variant.clone(),
             selection: input.provenance.selection.clone(),

@@ -14,6 +14,9 @@ use skinrig_model::{InvalidReason, LostTime, PreflightCheck, RunEnd};
 pub struct Provenance {
     /// ID of the session; appears in every figure.
     pub session_id: String,
+    /// Hash of the session's content, of its seal; `None` without a seal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub content_sha256: Option<String>,
     /// Start, civil time, RFC 3339.
     pub started: String,
     /// Name of the pressed prototype.

@@ -75,7 +75,7 @@ pub fn open(
 }
 
 /// Our languages: name of the table, key of the version, and description of such a file in messages.
-const LANGUAGES: [(&str, &str, &str); 7] = [
+const LANGUAGES: [(&str, &str, &str); 8] = [
     ("protocol", "skinrig", "a protocol"),
     (
         "schedule",
@@ -97,6 +97,11 @@ const LANGUAGES: [(&str, &str, &str); 7] = [
         "publication",
         "skinrig_publication",
         "a publication, which only `skinrig publish --about` reads",
+    ),
+    (
+        "settings",
+        "skinrig_settings",
+        "a file of settings, which only `skinrig reanalyze --settings` reads",
     ),
     (
         "suite",

@@ -29,6 +29,7 @@
 
 mod diagnostic;
 mod field;
+mod given;
 mod language;
 mod overrides;
 pub mod quantity;
@@ -41,6 +42,7 @@ mod yaml;
 
 pub use diagnostic::{Collector, Diagnostic, Diagnostics, Finding, closest, did_you_mean, one_of};
 pub use field::{Field, Value};
+pub use given::given;
 pub use language::open;
 pub use quantity::Dimension;
 pub use range::ValueRange;

@@ -284,6 +284,8 @@ pub(crate) enum SchemaKind {
     Selection,
     /// What a publication states (`publish --about`).
     Publication,
+    /// Settings (`reanalyze --settings`).
+    Settings,
     /// Suites (`hil run`).
     Suite,
 }

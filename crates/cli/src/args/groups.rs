@@ -22,6 +22,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
         "Analyse",
         &[
             "analyze",
+            "reanalyze",
             "report",
             "compare",
             "tradeoff",

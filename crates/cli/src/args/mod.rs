@@ -35,6 +35,7 @@ pub(crate) use self::values::StopRule;
 use crate::catalogue::args::CatalogueArgs;
 use crate::exit::Exit;
 use crate::hil::args::{HilArgs, HoldArmArgs};
+use crate::reanalyze::args::ReanalyzeArgs;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
 #[derive(Debug, Parser)]
@@ -183,6 +184,15 @@ pub(crate) enum Command {
     )]
     Analyze(AnalyzeArgs),
 
+    /// Analyse many sessions again with other settings; each result is a variant beside its session.
+    #[command(
+        after_help = "Examples:\n  skinrig reanalyze --settings wider.yaml sessions/\n  \
+        skinrig reanalyze --settings wider.yaml --name wider --jobs 4 lamp-on.selection.yaml\n\n\
+        Repeat an interrupted command to finish it: sealed sessions with complete results of these settings are not analysed\n\
+        again. A session that fails does not stop the others."
+    )]
+    Reanalyze(ReanalyzeArgs),
+
     /// Write a session's HTML report, analysing the session first if needed.
     #[command(
         after_help = "Example:\n  skinrig report sessions/NAME.session.sqlite --out report.html"
@@ -309,6 +319,10 @@ pub(crate) enum Command {
     /// Learn what a touch is from a session that is under way.
     #[command(hide = true)]
     LearnSkin(LearnSkinArgs),
+
+    /// Carry out one request of a re-analysis.
+    #[command(hide = true)]
+    AnalyzeRequest,
 
     /// Brake the robot's arm if the program that started this one dies.
     #[command(hide = true)]

@@ -1,7 +1,8 @@
 //! Registers a session that a command has just recorded, analysed or tagged. Best effort: the command never fails because of the
 //! catalogue, and waits at most [`WAIT`], when the robot is at rest. Lists a folder from its catalogue.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError, ListedSession};
@@ -18,6 +19,30 @@ pub(crate) fn register(session: &Path) {
         errln!(
             "note: {} is not in the catalogue as it is: {e}\n  next: `skinrig catalogue register {0}`",
             session.display()
+        );
+    }
+}
+
+/// Registers those of `sessions`, all in `folder`, whose entries are stale; says so if that fails. For commands without a robot: waits
+/// for another program that writes the catalogue.
+pub(crate) fn register_stale(folder: &Path, sessions: &[PathBuf]) {
+    let attempt = || {
+        let mut catalogue =
+            Catalogue::open(Address::of_folder(folder), Access::Write, super::WAIT)?;
+        let stale = catalogue.status(folder)?.stale;
+        let stale: BTreeSet<String> = stale.into_iter().map(|stale| stale.file).collect();
+        let is_stale = |path: &&PathBuf| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            path.is_file() && stale.contains(name.as_ref())
+        };
+        let stale: Vec<PathBuf> = sessions.iter().filter(is_stale).cloned().collect();
+        catalogue.register(&stale)?;
+        catalogue.close()
+    };
+    if let Err(e) = attempt() {
+        errln!(
+            "note: the new results are not in the catalogue: {e}\n  next: `skinrig catalogue register {}`",
+            folder.display()
         );
     }
 }

@@ -4,6 +4,7 @@ mod write;
 
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use skinrig_model::SelectedOut;
 use skinrig_protocol::Selection;
@@ -17,7 +18,7 @@ use crate::paths::folder_of;
 pub(crate) use self::write::select;
 
 /// The part of a selection that belongs to one session.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SelectedPresses {
     /// The selection.
     pub name: SelectionName,

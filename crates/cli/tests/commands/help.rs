@@ -2,7 +2,7 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 32] = [
+const COMMANDS: [&str; 33] = [
     "init",
     "new",
     "doctor",
@@ -18,6 +18,7 @@ const COMMANDS: [&str; 32] = [
     "catalogue",
     "show",
     "analyze",
+    "reanalyze",
     "report",
     "verify",
     "salvage",

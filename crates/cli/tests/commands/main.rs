@@ -39,6 +39,7 @@ mod pictures;
 mod pipeline;
 mod publish;
 mod python;
+mod reanalyze;
 mod remounted;
 mod replay;
 mod resume;

@@ -13,6 +13,7 @@ pub(crate) fn provenance() -> Provenance {
     };
     Provenance {
         session_id: "2026-03-02_14-05-09_meander".into(),
+        content_sha256: None,
         started: "2026-03-02T14:05:09+01:00".into(),
         prototype: "waveguide 3, second pour".into(),
         operator: "A. Example".into(),
