@@ -15,10 +15,12 @@ use crate::error::AnalysisError;
 use crate::estimators::{ColumnEstimate, PressEstimator, Thinning};
 use crate::event_cache::EventCache;
 use crate::grid::PixelGrid;
+use crate::hot_pixels::{HotPixelMask, PixelCounts};
 use crate::indentation::{PhaseCollector, PhasePlan, PressPhases};
 use crate::input::EventSource;
 use crate::press_event_collector::{PressEventCollector, RetentionPlan};
 use crate::press_events::PackedEvent;
+use crate::press_view::{EventCounts, press_view};
 use crate::rates::RateHistogram;
 use crate::result::{Activity, OffSensor, PicturePixel, PressPicture, PressView, RateZoom};
 use crate::segment::Window;
@@ -69,6 +71,10 @@ pub(crate) struct PassRequest<'a> {
     pub rates: Option<RateHistogram>,
     /// Cache for the events of the crop, for a second pass.
     pub cache: Option<EventCache>,
+    /// Counts per pixel to fill, to find the hot ones.
+    pub pixels: Option<PixelCounts>,
+    /// Pixels whose events do not count in windows, pictures, close-ups and kept presses.
+    pub hot: HotPixelMask,
 }
 
 /// Collects all outputs of one camera.
@@ -98,6 +104,8 @@ pub(crate) struct Accumulator<'a> {
     phase_collector: PhaseCollector,
     activity: Option<ActivityGrid>,
     cache: Option<EventCache>,
+    pixels: Option<PixelCounts>,
+    hot: HotPixelMask,
     /// Buffer for the events of a slice that are in the crop.
     inside: Vec<CdEvent>,
     bin_us: u64,
@@ -118,46 +126,8 @@ struct OpenWindow {
     events: Vec<PackedEvent>,
 }
 
-/// Event counts of a press in one camera.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct EventCounts {
-    /// Events in the window.
-    pub events: u32,
-    /// ON events in the window.
-    pub on: u32,
-    /// Events in the idle time before the press.
-    pub idle: u64,
-    /// See [`PressView::core_threshold`].
-    pub core_threshold: Option<u32>,
-    /// See [`PressView::width_u`].
-    pub width_u: Option<f64>,
-}
-
-/// Combines counts and estimate into the view of one camera.
-pub(crate) fn press_view(
-    window: &Window,
-    tally: EventCounts,
-    sighting: &ColumnEstimate,
-) -> PressView {
-    let per_s = |n: f64, s: f64| if s > 0.0 { n / s } else { 0.0 };
-    PressView {
-        events: tally.events,
-        on_events: tally.on,
-        clusters: sighting.clusters,
-        cluster_events: sighting.events,
-        centroid_u: sighting.column,
-        centroid_v: sighting.row,
-        rate_per_s: per_s(f64::from(tally.events), window.length_s()),
-        idle_rate_per_s: per_s(tally.idle as f64, window.idle_s()),
-        idle_s: window.idle_s(),
-        spread_u: sighting.spread_u,
-        spread_v: sighting.spread_v,
-        width_u: tally.width_u,
-        core_threshold: tally.core_threshold,
-    }
-}
-
 /// Outputs of [`Accumulator::finish`].
+#[derive(Default)]
 pub(crate) struct PassOutput {
     pub rates: Option<RateHistogram>,
     /// (row of the plan, view).
@@ -170,6 +140,8 @@ pub(crate) struct PassOutput {
     pub activity: Option<Activity>,
     /// All events of the crop, for a second pass; `None` if the cache overflowed or an event was late.
     pub cache: Option<EventCache>,
+    /// Counts per pixel, if they were requested.
+    pub pixels: Option<PixelCounts>,
     /// Events more than [`SLACK_US`] late.
     pub late: u64,
     /// Ignored events outside the sensor; all zero for a pass over cached events.
@@ -191,6 +163,8 @@ impl<'a> Accumulator<'a> {
             phases,
             rates,
             cache,
+            pixels,
+            hot,
         } = request;
         let zooms = zooms
             .into_iter()
@@ -205,6 +179,8 @@ impl<'a> Accumulator<'a> {
             crop: settings.crop_v[camera.index()],
             activity: rates.is_some().then(ActivityGrid::new),
             cache,
+            pixels,
+            hot,
             inside: vec![NO_EVENT; SLICE],
             rates,
             windows,
@@ -283,6 +259,9 @@ impl<'a> Accumulator<'a> {
         if let Some(rates) = &mut self.rates {
             rates.add_in_order(&inside[..count]);
         }
+        if let Some(pixels) = &mut self.pixels {
+            pixels.add(&inside[..count]);
+        }
         self.cache.take_if(|cache| !cache.add(&inside[..count]));
         self.take_inside(&inside[..count]);
         self.inside = inside;
@@ -301,8 +280,18 @@ impl<'a> Accumulator<'a> {
         }
     }
 
-    /// Processes events of the crop in time order.
+    /// Processes events of the crop in time order; those of hot pixels do not count.
     fn take_inside(&mut self, events: &[CdEvent]) {
+        if self.hot.is_empty() {
+            return self.take_counted(events);
+        }
+        let counted = events.iter().filter(|e| !self.hot.holds(e)).copied();
+        let counted: Vec<CdEvent> = counted.collect();
+        self.take_counted(&counted);
+    }
+
+    /// Processes events that count, in time order.
+    fn take_counted(&mut self, events: &[CdEvent]) {
         let mut rest = events;
         while let Some(first) = rest.first()
             && self.error.is_none()
@@ -540,6 +529,7 @@ impl<'a> Accumulator<'a> {
             views: self.views,
             pictures: self.pictures,
             cache: self.cache.filter(|_| self.late == 0),
+            pixels: self.pixels,
             late: self.late,
             off_sensor: self.off_sensor,
         })

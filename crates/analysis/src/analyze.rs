@@ -8,6 +8,8 @@ use crate::calibrate::SessionCalibration;
 use crate::camera_clocks::{CameraClock, CameraClocks};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
+use crate::event_cache::EventCache;
+use crate::hot_pixels::{HotPixelMask, PixelCounts};
 use crate::indentation::{self, PressPhases, phase_plans};
 use crate::input::{EventSource, SessionInput};
 use crate::locate_presses::{
@@ -22,8 +24,8 @@ use crate::press_spans::{spans, timings};
 use crate::rates::RateHistogram;
 use crate::result::{
     ANALYSIS_VERSION, Activity, Alignment, AlignmentStatus, AlignmentViolation, Analysis, ClockFit,
-    ClockMap, ContactTiming, DepthResult, MapName, OffSensor, PressPicture, PressResult, PressView,
-    RateSeries, RateZoom, RatesEvidence, Warning, WarningCause,
+    ClockMap, ContactTiming, DepthResult, HotPixels, MapName, OffSensor, PressPicture, PressResult,
+    PressView, RateSeries, RateZoom, RatesEvidence, Warning, WarningCause,
 };
 use crate::segment::{Window, windows};
 use crate::session_base::time_base;
@@ -35,8 +37,8 @@ use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, red
 /// Windows that overlap by less than this only touch, because their ends are rounded, µs.
 const OVERLAP_US: u64 = 100;
 
-/// Analyses a session. Each camera needs one pass over its events if its clock can be fitted to trigger marks, or two if it
-/// must be aligned by event rates; both cameras run in parallel. The second pass uses cached events of the crop. It reads
+/// Analyses a session. Each camera needs two passes over its events: the first finds event rates and hot pixels, the second
+/// fills the press windows; both cameras run in parallel. The second pass uses cached events of the crop. It reads
 /// them again if a camera has more than 2^25, or if some were too late for their windows.
 ///
 /// The result is bit-identical for the same input on the same machine. Memory does not grow with the number of events,
@@ -229,6 +231,7 @@ fn analyze_by(
         findings: Vec::new(),
         activity: [one.activity, two.activity].into_iter().flatten().collect(),
         off_sensor: [one.off_sensor, two.off_sensor],
+        hot_pixels: [one.hot_pixels, two.hot_pixels],
         rates: [one.rates, two.rates],
         presses,
         warnings: [one.warnings, two.warnings, warnings].concat(),
@@ -330,6 +333,7 @@ struct CameraResult {
     phases: Vec<PressPhases>,
     activity: Option<Activity>,
     off_sensor: OffSensor,
+    hot_pixels: HotPixels,
     warnings: Vec<Warning>,
 }
 
@@ -373,6 +377,37 @@ fn paired(
     }
 }
 
+/// Events of a camera, from the cache of the first pass if it holds them.
+struct Events<'a> {
+    source: &'a dyn EventSource,
+    camera: CameraId,
+    cache: Option<&'a EventCache>,
+}
+
+impl Events<'_> {
+    fn pass(&self, mut accumulator: Accumulator<'_>) -> Result<PassOutput, AnalysisError> {
+        match self.cache {
+            Some(cache) => {
+                accumulator.take_cached(cache);
+                accumulator.finish()
+            }
+            None => pass(self.source, self.camera, accumulator),
+        }
+    }
+
+    fn count(&self, mut pixels: PixelCounts) -> Result<PixelCounts, AnalysisError> {
+        let camera = self.camera;
+        match self.cache {
+            Some(cache) => cache.for_each_slice(|events| pixels.add(events)),
+            None => self
+                .source
+                .for_each_slice(camera, &mut |events| pixels.add(events))
+                .map_err(|source| AnalysisError::Events { camera, source })?,
+        }
+        Ok(pixels)
+    }
+}
+
 fn camera_pass(
     input: &SessionInput,
     source: &dyn EventSource,
@@ -385,9 +420,9 @@ fn camera_pass(
     let CameraClock {
         clock,
         rates,
-        read,
         activity,
         cache,
+        pixels,
         untimed,
         off_sensor,
         mut warnings,
@@ -395,45 +430,45 @@ fn camera_pass(
     let list = clock.map_or_else(Vec::new, |c| {
         windows(timings(input), &input.earlier, &c, settings)
     });
-    let collected = match (clock, rates) {
-        // Without a clock, the events have already been read and contain nothing more.
-        (None, rates) => PassOutput {
-            rates,
-            views: Vec::new(),
-            pictures: Vec::new(),
-            zooms: Vec::new(),
-            kept: Vec::new(),
-            phases: Vec::new(),
-            activity,
-            cache: None,
-            late: 0,
-            off_sensor,
-        },
-        (Some(clock), rates) => {
-            let (fresh, known) = if read { (None, rates) } else { (rates, None) };
-            let wanted = PassRequest {
-                windows: &list,
-                pictured: &plan.pictures,
-                zooms: zoom_plans(input, plan, &clock),
-                kept: keep_plans(input, plan, &list, &clock),
-                phases: phase_plans(input, &list, &clock),
-                rates: fresh,
-                cache: None,
-            };
-            let mut accumulator = Accumulator::new(camera, settings, wanted);
-            let mut done = match cache {
-                Some(cache) => {
-                    accumulator.take_cached(&cache);
-                    let done = accumulator.finish()?;
-                    PassOutput { off_sensor, ..done }
-                }
-                None => pass(source, camera, accumulator)?,
-            };
-            done.rates = done.rates.or(known);
-            done.activity = done.activity.or(activity);
-            done
-        }
+    let events = Events {
+        source,
+        camera,
+        cache: cache.as_ref(),
     };
+    let mut hot_pixels = HotPixels::default();
+    let mut collected = PassOutput::default();
+    // Without a clock, the events contain nothing more.
+    if let Some(clock) = clock {
+        let pixels = match pixels {
+            Some(pixels) => pixels,
+            None => events.count(PixelCounts::new(settings.crop_v[k], &list))?,
+        };
+        hot_pixels = pixels.hot(settings);
+        let wanted = PassRequest {
+            windows: &list,
+            pictured: &plan.pictures,
+            zooms: zoom_plans(input, plan, &clock),
+            kept: keep_plans(input, plan, &list, &clock),
+            phases: phase_plans(input, &list, &clock),
+            hot: HotPixelMask::new(&hot_pixels),
+            ..PassRequest::default()
+        };
+        collected = events.pass(Accumulator::new(camera, settings, wanted))?;
+    }
+    collected = PassOutput {
+        rates,
+        activity,
+        off_sensor,
+        ..collected
+    };
+    if !hot_pixels.pixels.is_empty() {
+        warnings.push(WarningCause::HotPixels {
+            pixels: hot_pixels.pixels.len() as u32,
+            of: hot_pixels.of,
+            highest_per_s: hot_pixels.highest_per_s,
+            idle_share: hot_pixels.idle_share,
+        });
+    }
     if list
         .windows(2)
         .any(|w| w[1].start_us + OVERLAP_US < w[0].end_us)
@@ -488,6 +523,7 @@ fn camera_pass(
         phases: collected.phases,
         activity: collected.activity,
         off_sensor,
+        hot_pixels,
         warnings: warnings
             .into_iter()
             .map(|cause| Warning::of_camera(camera, cause))

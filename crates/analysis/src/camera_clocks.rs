@@ -7,12 +7,14 @@ use crate::accumulate::{Accumulator, PassRequest, pass, rate_bin_us};
 use crate::clock::{MarksError, align_by_rates, fit_marks};
 use crate::error::AnalysisError;
 use crate::event_cache::EventCache;
+use crate::hot_pixels::PixelCounts;
 use crate::input::{EventSource, SessionInput};
-use crate::press_spans::spans;
+use crate::press_spans::{spans, timings};
 use crate::rates::RateHistogram;
 use crate::result::{
     Activity, AlignmentViolation, ClockFit, OffSensor, RatesDetections, RatesEvidence, WarningCause,
 };
+use crate::segment::windows;
 use crate::tie::{Tie, UntimedPress};
 use crate::timebase::TimeBase;
 use crate::untimed;
@@ -20,12 +22,11 @@ use crate::untimed;
 /// Clock of a camera, and by-products of finding it.
 pub(crate) struct CameraClock {
     pub clock: Option<ClockFit>,
-    /// Filled if the events were read for the clock; otherwise still to be filled.
     pub rates: Option<RateHistogram>,
-    /// True if the events have been read.
-    pub read: bool,
     pub activity: Option<Activity>,
     pub cache: Option<EventCache>,
+    /// Counts per pixel; `None` if the clock was not known before the events.
+    pub pixels: Option<PixelCounts>,
     /// Per row of the plan: why the clock does not time it.
     pub untimed: Vec<Option<UntimedPress>>,
     pub off_sensor: OffSensor,
@@ -42,7 +43,7 @@ pub(crate) struct CameraClocks {
 }
 
 impl CameraClocks {
-    /// Finds the clocks. Reads events if neither time base nor marks give one; cameras in parallel.
+    /// Reads the events and finds the clocks; cameras in parallel.
     pub(crate) fn new(
         input: &SessionInput,
         source: &dyn EventSource,
@@ -72,7 +73,7 @@ impl CameraClocks {
         let spans = spans(input);
         let rates = [0, 1].map(|k| {
             let reading = &self.cameras[k];
-            reading.rates.as_ref().filter(|_| reading.read)
+            reading.rates.as_ref().filter(|_| reading.clock.is_none())
         });
         if spans.is_empty() || rates.iter().all(Option::is_none) {
             return;
@@ -128,10 +129,10 @@ impl CameraClock {
         };
         let mut reading = Self {
             clock: base_clock.or(marks.as_ref().map(|m| m.fit)),
-            rates: Some(RateHistogram::new(rate_bin_us(&input.settings))),
-            read: false,
+            rates: None,
             activity: None,
             cache: None,
+            pixels: None,
             untimed: untimed::rows(input, camera, base, marks.as_ref()),
             off_sensor: OffSensor::default(),
             warnings: Vec::new(),
@@ -147,9 +148,6 @@ impl CameraClock {
         reading
             .warnings
             .extend(marks.into_iter().flat_map(|m| m.warnings));
-        if reading.clock.is_some() {
-            return Ok(reading);
-        }
         if let Some(why) = why.filter(|_| !input.marks.is_empty()) {
             reading.warnings.push(WarningCause::NoMarksClock {
                 sent: input.marks.len(),
@@ -157,21 +155,23 @@ impl CameraClock {
                 why,
             });
         }
+        let settings = &input.settings;
+        let pixels = reading.clock.map(|clock| {
+            let windows = windows(timings(input), &input.earlier, &clock, settings);
+            PixelCounts::new(settings.crop_v[k], &windows)
+        });
         let wanted = PassRequest {
-            rates: reading.rates.take(),
+            rates: Some(RateHistogram::new(rate_bin_us(settings))),
             cache: Some(EventCache::default()),
+            pixels,
             ..PassRequest::default()
         };
-        let first = pass(
-            source,
-            camera,
-            Accumulator::new(camera, &input.settings, wanted),
-        )?;
+        let first = pass(source, camera, Accumulator::new(camera, settings, wanted))?;
         Ok(Self {
             rates: first.rates,
-            read: true,
             activity: first.activity,
             cache: first.cache,
+            pixels: first.pixels,
             off_sensor: first.off_sensor,
             ..reading
         })

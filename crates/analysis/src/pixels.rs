@@ -37,6 +37,12 @@ impl PixelSet {
         self.words[index / BITS] |= 1 << (index % BITS);
     }
 
+    /// True if this pixel is in the set; false beyond the rows.
+    pub(crate) fn contains(&self, index: usize) -> bool {
+        let word = self.words.get(index / BITS);
+        word.is_some_and(|word| word >> (index % BITS) & 1 == 1)
+    }
+
     /// Appends the indices in the set, ascending, to `out`.
     pub(crate) fn append_to(&self, out: &mut Vec<u32>) {
         for (i, &word) in self.words.iter().enumerate() {

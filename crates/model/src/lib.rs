@@ -26,6 +26,7 @@ pub mod reason;
 pub mod record;
 mod remount;
 mod rig_fault;
+mod rig_geometry;
 pub mod run_end;
 pub mod scene;
 pub mod selection;
@@ -65,13 +66,14 @@ pub use record::{
 };
 pub use remount::RemountSettings;
 pub use rig_fault::{RigFault, UnsupportedFault};
+pub use rig_geometry::RigGeometry;
 pub use run_end::{RunEnd, StopReason};
 pub use scene::{SceneNeed, ScenePart, SimLevel};
 pub use selection::{SelectedOut, SelectionReason};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
     Estimator, LatencySettings, Locator, Precision, ReducedLatencySettings, ReducedThresholdGrid,
-    ReductionSettings, RigGeometry, ThresholdGrid, ThresholdRule, WindowAnchor,
+    ReductionSettings, ThresholdGrid, ThresholdRule, WindowAnchor,
 };
 pub use skin::{OUTLINE_SHAPE, SkinOutline};
 pub use stopping::{Look, StopAnswer, StopMetric, StopQuestion};

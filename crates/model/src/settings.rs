@@ -3,12 +3,10 @@
 use serde::{Deserialize, Serialize};
 use skinrig_settings::{Choice, Collector, Field, Setting, Settings, ValueRange};
 
-use crate::camera::StereoGeometry;
 use crate::id::PressId;
 use crate::lens::LensKind;
 use crate::remount::RemountSettings;
 use crate::selection::{SelectedOut, SelectionReason};
-use crate::skin::SkinOutline;
 
 /// Times are kept in whole nanoseconds.
 const NANOSECOND_MS: f64 = 1e-6;
@@ -392,6 +390,10 @@ pub struct AnalysisSettings {
     /// pixel during the window, plus this many of their standard deviations (Poisson). 0: `min_samples` alone, as in the paper.
     #[setting(default = "4", max = 100.0)]
     pub background_margin: f64,
+    /// A pixel that fires in idle time at this many times the median rate of the crop, again and again and no more during presses, is
+    /// hot: its events do not count. 0: all pixels count, as in the paper.
+    #[setting(default = "10", max = 1e6)]
+    pub hot_pixel_ratio: f64,
     /// Clustered events that form the centroid of a press.
     #[setting(default = "largest_cluster")]
     pub centroid: CentroidRule,
@@ -586,18 +588,4 @@ impl AnalysisSettings {
         self.exclude_press_numbers.extend(presses);
         Some(self)
     }
-}
-
-/// Rig geometry for an analysis: part of `RunHeader::rig_json`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct RigGeometry {
-    /// The skin's outline.
-    pub outline: SkinOutline,
-    /// The nominal (drawn or measured, not calibrated) camera geometry: the start of the calibration.
-    pub nominal: StereoGeometry,
-    /// The camera trigger channel that carries the marks; `None` without a trigger line.
-    pub trigger_channel: Option<u8>,
-    /// Delay per camera from an edge at its trigger input to its time stamp, whole µs; 0 if not measured.
-    #[serde(default)]
-    pub trigger_delay_us: [u16; 2],
 }

@@ -34,6 +34,7 @@ impl SkinModel {
             outline: analysis.rig.outline,
             geometry: analysis.geometry,
             locator: analysis.locator.clone(),
+            hot_pixels: analysis.hot_pixels.clone(),
             clocks: *training.clocks(),
             threshold: idle.threshold(false_alarms_per_s),
             settling: None,

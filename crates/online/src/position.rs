@@ -6,9 +6,10 @@ use serde::Serialize;
 use skinrig_analysis::Analysis;
 use skinrig_analysis::background::Background;
 use skinrig_analysis::estimators::{PressEstimator, Thinning};
+use skinrig_analysis::hot_pixels::HotPixelMask;
 use skinrig_analysis::locator::{CameraFeatures, FittedLocator, Location, LocatorModelError};
 use skinrig_analysis::press_events::PackedEvent;
-use skinrig_analysis::result::{LocationOutcome, Region};
+use skinrig_analysis::result::{HotPixels, LocationOutcome, Region};
 use skinrig_analysis::segment::Window;
 use skinrig_model::{
     AnalysisSettings, CameraId, CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH, SkinOutline,
@@ -64,6 +65,7 @@ impl Position {
 #[derive(Debug, Clone)]
 struct CameraWindow {
     rows: (u16, u16),
+    hot: HotPixelMask,
     thinning: Thinning,
     estimator: PressEstimator,
     /// The newest events; at most [`HISTORY`].
@@ -79,10 +81,11 @@ struct CameraWindow {
 }
 
 impl CameraWindow {
-    fn new(settings: &AnalysisSettings, camera: CameraId) -> Self {
+    fn new(settings: &AnalysisSettings, hot: &HotPixels, camera: CameraId) -> Self {
         let rows = settings.crop_v[camera.index()];
         Self {
             rows,
+            hot: HotPixelMask::new(hot),
             thinning: Thinning::new(settings.thinning, camera, settings.seed),
             estimator: PressEstimator::new(settings, rows),
             history: VecDeque::with_capacity(HISTORY),
@@ -97,7 +100,10 @@ impl CameraWindow {
 
     fn counts(&self, e: &CdEvent) -> bool {
         let on_sensor = e.x < SENSOR_WIDTH && e.y < SENSOR_HEIGHT;
-        on_sensor && (self.rows.0..=self.rows.1).contains(&e.y) && self.thinning.keeps(e)
+        on_sensor
+            && (self.rows.0..=self.rows.1).contains(&e.y)
+            && !self.hot.holds(e)
+            && self.thinning.keeps(e)
     }
 
     fn push(&mut self, event: &CdEvent) {
@@ -211,6 +217,7 @@ impl PositionEstimator {
         let locator = FittedLocator::of(analysis)?;
         Ok(Self::with(
             &analysis.settings,
+            &analysis.hot_pixels,
             locator,
             analysis.rig.outline,
         ))
@@ -218,12 +225,14 @@ impl PositionEstimator {
 
     pub(crate) fn with(
         settings: &AnalysisSettings,
+        hot: &[HotPixels; 2],
         locator: FittedLocator,
         outline: SkinOutline,
     ) -> Self {
         Self {
             settings: settings.clone(),
-            cameras: CameraId::ALL.map(|camera| CameraWindow::new(settings, camera)),
+            cameras: CameraId::ALL
+                .map(|camera| CameraWindow::new(settings, &hot[camera.index()], camera)),
             locator,
             outline,
         }

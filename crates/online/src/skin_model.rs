@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::locator::{FittedLocator, LocatorModelError};
-use skinrig_analysis::result::{ClockFit, LocatorResult};
+use skinrig_analysis::result::{ClockFit, HotPixels, LocatorResult};
 use skinrig_model::{AnalysisSettings, SkinOutline, StereoGeometry};
 
 use crate::model::TouchModel;
@@ -16,6 +16,8 @@ pub struct SkinModel {
     pub(crate) outline: SkinOutline,
     pub(crate) geometry: StereoGeometry,
     pub(crate) locator: Option<LocatorResult>,
+    /// Pixels of each camera that do not count for positions.
+    pub(crate) hot_pixels: [HotPixels; 2],
     /// Clock of each camera.
     pub(crate) clocks: [ClockFit; 2],
     pub(crate) touches: TouchModel,
@@ -34,6 +36,7 @@ impl SkinModel {
         let locator = FittedLocator::restored(self.locator.as_ref(), self.geometry)?;
         Ok(PositionEstimator::with(
             &self.settings,
+            &self.hot_pixels,
             locator,
             self.outline,
         ))
@@ -113,6 +116,7 @@ impl SkinModel {
             outline: SkinOutline::PAPER,
             geometry: StereoGeometry::PAPER,
             locator: None,
+            hot_pixels: Default::default(),
             clocks,
             touches,
             threshold,

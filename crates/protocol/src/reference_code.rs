@@ -6,7 +6,7 @@
 /// press, thresholds 17 to 19, and 3 to 8 at 1/1024 of the events. Each has its source in `docs/reference/paper.md`.
 ///
 /// The calibration stays the protocol's: the block that judges as published fits the paper's eight parameters itself.
-pub const REFERENCE_CODE: [&str; 33] = [
+pub const REFERENCE_CODE: [&str; 34] = [
     "analysis.crop.camera1=[185 px, 360 px]",
     "analysis.crop.camera2=[200 px, 355 px]",
     "analysis.window_anchor=middle",
@@ -15,6 +15,7 @@ pub const REFERENCE_CODE: [&str; 33] = [
     "analysis.eps=10 px",
     "analysis.min_samples=10",
     "analysis.background_margin=0",
+    "analysis.hot_pixel_ratio=0",
     "analysis.centroid=all_clusters",
     "analysis.estimator=dbscan",
     "analysis.thinning=1",

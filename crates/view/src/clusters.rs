@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 use skinrig_analysis::dbscan::{Dbscan, NOISE};
 use skinrig_analysis::grid::PixelGrid;
+use skinrig_analysis::hot_pixels::HotPixelMask;
 use skinrig_analysis::segment::windows;
 use skinrig_model::{CameraId, PressId};
 
@@ -50,12 +51,15 @@ pub(crate) fn document(opened: &OpenSession, press: PressId) -> Result<Value, Pr
         let (from_us, to_us) = (to_recorded(window.start_us), to_recorded(window.end_us));
         let rows = settings.crop_v[k];
         let mut grid = PixelGrid::new(rows);
+        let hot = HotPixelMask::new(&analysis.hot_pixels[k]);
         skinrig_results::events_between(
             &opened.reader,
             &known.indices[k],
             (from_us, to_us.saturating_sub(1)),
             |event| {
-                grid.add(event.x, event.y);
+                if !hot.holds(&event) {
+                    grid.add(event.x, event.y);
+                }
             },
         )?;
         let view = analysis.presses.iter().find(|p| p.press == press);

@@ -161,6 +161,9 @@ pub struct Analysis {
     /// Looks of a campaign that ends by itself; `None` if the plan declares none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub campaign: Option<CampaignLooks>,
+    /// Pixels of each camera that do not count.
+    #[serde(default)]
+    pub hot_pixels: [HotPixels; 2],
     /// Touches felt while the session was recorded; `None` if none were to be felt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub felt: Option<FeltTouches>,
@@ -399,6 +402,20 @@ impl PressResult {
         let (e, t) = (self.estimate()?, self.truth?);
         Some((e.x_mm - t.x_mm, e.y_mm - t.y_mm))
     }
+}
+
+/// Pixels of the crop that fire in idle time again and again, and no more during presses. Their events do not count.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct HotPixels {
+    /// Column and row of each.
+    pub pixels: Vec<(u16, u16)>,
+    /// Pixels of the crop.
+    pub of: u32,
+    /// Highest idle rate among them, events/s.
+    pub highest_per_s: f64,
+    /// Share of the idle events of the crop that comes from them.
+    pub idle_share: f64,
 }
 
 /// View of a press by one camera.

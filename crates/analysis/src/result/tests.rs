@@ -232,6 +232,11 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
              alone puts 8.3 events within eps (10 px) of an event, and 10 make a cluster",
         ),
         (
+            json!({"camera": "camera1", "kind": "hot_pixels", "pixels": 20, "of": 112_640, "highest_per_s": 1003.4, "idle_share": 0.91}),
+            "camera 1: 20 hot pixels are left out (0.02 % of the crop): they fire without presses, up to 1003 times a second, \
+             91 % of the idle events; look for reflections and flickering lamps",
+        ),
+        (
             json!({"kind": "no_scored_press"}),
             "no scored press was attempted, so there are no metrics",
         ),

@@ -206,6 +206,22 @@ pub enum WarningCause {
         /// A setting beyond the background.
         advised_min_samples: f64,
     },
+    /// Hot pixels are left out.
+    #[error(
+        "{pixels} hot pixels are left out ({:.2} % of the crop): they fire without presses, up to {highest_per_s:.0} times a second, \
+         {:.0} % of the idle events; look for reflections and flickering lamps",
+        100.0 * f64::from(*.pixels) / f64::from(*.of), 100.0 * .idle_share
+    )]
+    HotPixels {
+        /// Hot pixels.
+        pixels: u32,
+        /// Pixels of the crop.
+        of: u32,
+        /// Highest rate among them, events/s.
+        highest_per_s: f64,
+        /// Their share of the idle events.
+        idle_share: f64,
+    },
     /// No metrics.
     #[error("no scored press was attempted, so there are no metrics")]
     NoScoredPress,

@@ -4,7 +4,6 @@ use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, SkinOut
 
 use super::choice::Region;
 use super::winner::PressErrors;
-use crate::accumulate::{EventCounts, press_view};
 use crate::analyze::{by_row, lost_rows};
 use crate::estimators::{PressEstimator, Thinning};
 use crate::input::SessionInput;
@@ -13,6 +12,7 @@ use crate::locator::Effort;
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::press_events::{EventView, PackedEvent, RetainedPress, RetainedPresses};
 use crate::press_spans::timings;
+use crate::press_view::{EventCounts, press_view};
 use crate::result::{Analysis, ClockFit, Metrics, PenalisedRmse, PressView};
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;

@@ -292,7 +292,11 @@ fn feel_presses() {
     let observed = nights.night("reaction");
     let all = format!("{:#}\n{}", observed.check("reaction"), observed.stderr);
     for metric in ["felt", "differences"] {
-        assert_eq!(observed.metric_verdict("reaction", "skin", metric), "PASS", "{all}");
+        assert_eq!(
+            observed.metric_verdict("reaction", "skin", metric),
+            "PASS",
+            "{all}"
+        );
     }
     let reaction_s = observed.value("reaction", "skin", "reaction").expect(&all);
     assert!(reaction_s > 0.0, "{all}");

@@ -137,6 +137,7 @@ pub(crate) fn analysis(side: u32, repetitions: u32) -> Analysis {
         alignment: alignment(),
         legs: Vec::new(),
         contact_timing: Default::default(),
+        hot_pixels: Default::default(),
         settings: AnalysisSettings::default(),
         rig: RigGeometry {
             outline,

@@ -1,0 +1,308 @@
+//! Owns which pixels are hot: they fire in idle time again and again, and no more during presses.
+//!
+//! A few hot pixels, or a reflection that flickers, make clusters that no press made. The background that
+//! [`Background`](crate::background::Background) assumes is uniform, so pixels far above it are found one by one and left out.
+
+use skinrig_model::{AnalysisSettings, CdEvent, SENSOR_WIDTH};
+
+use crate::pixels::PixelSet;
+use crate::result::HotPixels;
+use crate::segment::Window;
+
+/// Idle times in which a hot pixel fires, at least; and as a share of all.
+const LEAST_SPANS: u32 = 4;
+const LEAST_SHARE: f64 = 0.25;
+/// Rate during presses of a hot pixel, at most, in idle rates: presses excite the others more.
+const MOST_EXCITED: f64 = 3.0;
+
+/// A span of camera time, half-open, µs.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    from_us: u64,
+    to_us: u64,
+    /// Number of the idle time; `None` for a press window.
+    idle: Option<u32>,
+}
+
+/// What a pixel did.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pixel {
+    idle_events: u32,
+    press_events: u32,
+    /// Idle times in which it fired,
+    spans: u32,
+    /// and the number of the last one, from 1.
+    last_span: u32,
+}
+
+/// Events per pixel of the crop, in the idle times and in the press windows of a camera.
+pub(crate) struct PixelCounts {
+    rows: (u16, u16),
+    /// Disjoint, in order.
+    spans: Vec<Span>,
+    /// The span of the last event.
+    at: usize,
+    pixels: Vec<Pixel>,
+}
+
+impl PixelCounts {
+    /// No events yet; `windows` in order of their start.
+    pub(crate) fn new(rows: (u16, u16), windows: &[Window]) -> Self {
+        let mut spans: Vec<Span> = Vec::with_capacity(2 * windows.len());
+        let mut end_us = 0;
+        for (window, number) in windows.iter().zip(1..) {
+            for (from_us, to_us, idle) in [
+                (window.idle_start_us, window.start_us, Some(number)),
+                (window.start_us, window.end_us, None),
+            ] {
+                let from_us = from_us.max(end_us);
+                if from_us < to_us {
+                    spans.push(Span {
+                        from_us,
+                        to_us,
+                        idle,
+                    });
+                    end_us = to_us;
+                }
+            }
+        }
+        let height = usize::from(rows.1.saturating_sub(rows.0)) + 1;
+        Self {
+            rows,
+            spans,
+            at: 0,
+            pixels: vec![Pixel::default(); height * usize::from(SENSOR_WIDTH)],
+        }
+    }
+
+    /// Counts events, nearly in order of time; those outside the crop and the spans do not count.
+    pub(crate) fn add(&mut self, events: &[CdEvent]) {
+        for event in events {
+            let inside = (self.rows.0..=self.rows.1).contains(&event.y) && event.x < SENSOR_WIDTH;
+            if !inside || !self.reach(event.t_us) {
+                continue;
+            }
+            let index = usize::from(event.y - self.rows.0) * usize::from(SENSOR_WIDTH);
+            let pixel = &mut self.pixels[index + usize::from(event.x)];
+            match self.spans[self.at].idle {
+                None => pixel.press_events = pixel.press_events.saturating_add(1),
+                Some(number) => {
+                    pixel.idle_events = pixel.idle_events.saturating_add(1);
+                    pixel.spans += u32::from(pixel.last_span != number);
+                    pixel.last_span = number;
+                }
+            }
+        }
+    }
+
+    /// Moves to the span that holds this time; false if none does.
+    fn reach(&mut self, t_us: u64) -> bool {
+        let holds = |span: &Span| (span.from_us..span.to_us).contains(&t_us);
+        if self.spans.get(self.at).is_some_and(holds) {
+            return true;
+        }
+        self.at = self.spans.partition_point(|s| s.to_us <= t_us);
+        self.spans.get(self.at).is_some_and(holds)
+    }
+
+    /// The hot pixels.
+    pub(crate) fn hot(self, settings: &AnalysisSettings) -> HotPixels {
+        let total_s = |idle: bool| {
+            let spans = self.spans.iter().filter(|s| s.idle.is_some() == idle);
+            spans.map(|s| (s.to_us - s.from_us) as f64).sum::<f64>() * 1e-6
+        };
+        let (idle_s, press_s) = (total_s(true), total_s(false));
+        let idle_spans = self.spans.iter().filter(|s| s.idle.is_some()).count();
+        let least_spans = LEAST_SPANS.max((LEAST_SHARE * idle_spans as f64).ceil() as u32);
+        let all: u64 = self.pixels.iter().map(|p| u64::from(p.idle_events)).sum();
+        let mut found = HotPixels {
+            of: self.pixels.len() as u32,
+            ..HotPixels::default()
+        };
+        if settings.hot_pixel_ratio <= 0.0 || idle_s <= 0.0 || press_s <= 0.0 {
+            return found;
+        }
+        let counts = &mut self
+            .pixels
+            .iter()
+            .map(|p| p.idle_events)
+            .collect::<Vec<_>>()[..];
+        let middle = counts.len() / 2;
+        let median = f64::from(*counts.select_nth_unstable(middle).1);
+        let mut hot_events = 0;
+        for (index, pixel) in self.pixels.iter().enumerate() {
+            let idle = f64::from(pixel.idle_events);
+            let is_hot = pixel.spans >= least_spans
+                && idle >= settings.hot_pixel_ratio * median
+                && f64::from(pixel.press_events) * idle_s <= MOST_EXCITED * idle * press_s;
+            if is_hot {
+                let (row, column) = (
+                    index / usize::from(SENSOR_WIDTH),
+                    index % usize::from(SENSOR_WIDTH),
+                );
+                found.pixels.push((column as u16, self.rows.0 + row as u16));
+                found.highest_per_s = found.highest_per_s.max(idle / idle_s);
+                hot_events += u64::from(pixel.idle_events);
+            }
+        }
+        found.idle_share = hot_events as f64 / all.max(1) as f64;
+        found
+    }
+}
+
+/// Hot pixels of a camera as a set.
+#[derive(Debug, Clone, Default)]
+pub struct HotPixelMask {
+    set: PixelSet,
+    any: bool,
+}
+
+impl HotPixelMask {
+    /// Of these pixels, which lie on the sensor.
+    #[must_use]
+    pub fn new(hot: &HotPixels) -> Self {
+        let rows = hot
+            .pixels
+            .iter()
+            .map(|(_, row)| usize::from(*row) + 1)
+            .max();
+        let mut set = PixelSet::new(rows.unwrap_or(0));
+        for (column, row) in &hot.pixels {
+            set.insert(usize::from(*row) * usize::from(SENSOR_WIDTH) + usize::from(*column));
+        }
+        Self {
+            set,
+            any: !hot.pixels.is_empty(),
+        }
+    }
+
+    /// True without hot pixels.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        !self.any
+    }
+
+    /// True if an event on the sensor comes from a hot pixel.
+    #[must_use]
+    pub fn holds(&self, event: &CdEvent) -> bool {
+        self.any
+            && self
+                .set
+                .contains(usize::from(event.y) * usize::from(SENSOR_WIDTH) + usize::from(event.x))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinrig_model::Polarity;
+    use skinrig_statistics::seeded;
+
+    const ROWS: (u16, u16) = (185, 360);
+    const PRESSES: u64 = 40;
+
+    /// A press every 2 s: idle time for 0.5 s, then a window of 0.4 s.
+    fn windows() -> Vec<Window> {
+        let window = |row: u64| Window {
+            row: row as usize,
+            idle_start_us: 2_000_000 * row + 500_000,
+            start_us: 2_000_000 * row + 1_000_000,
+            end_us: 2_000_000 * row + 1_400_000,
+        };
+        (0..PRESSES).map(window).collect()
+    }
+
+    fn event(t_us: u64, x: u16, y: u16) -> CdEvent {
+        CdEvent {
+            t_us,
+            x,
+            y,
+            polarity: Polarity::On,
+        }
+    }
+
+    /// Events at this rate, from `from_us` on, of one pixel.
+    fn steady(per_s: f64, (x, y): (u16, u16), seed: u64) -> Vec<CdEvent> {
+        let mut rng = seeded::generator(7, seed);
+        let mut t = 0.0;
+        let mut events = Vec::new();
+        while t < 2.0 * PRESSES as f64 {
+            events.push(event((t * 1e6) as u64, x, y));
+            let chance = 0.499 * (1.0 + seeded::signed_unit(&mut rng));
+            t -= libm::log1p(-chance) / per_s;
+        }
+        events
+    }
+
+    fn hot(mut events: Vec<CdEvent>, ratio: f64) -> HotPixels {
+        events.sort_by_key(|e| e.t_us);
+        let mut counts = PixelCounts::new(ROWS, &windows());
+        counts.add(&events);
+        let settings = AnalysisSettings {
+            hot_pixel_ratio: ratio,
+            ..AnalysisSettings::default()
+        };
+        counts.hot(&settings)
+    }
+
+    #[test]
+    fn pixels_that_fire_again_and_again_are_hot() {
+        let places = [(320, 270), (0, 185), (639, 360)];
+        let events = places
+            .iter()
+            .zip(0..)
+            .flat_map(|(at, seed)| steady(5.0, *at, seed));
+        let found = hot(events.collect(), 10.0);
+        let mut expected = places;
+        expected.sort_unstable_by_key(|(x, y)| (*y, *x));
+        assert_eq!(found.pixels, expected);
+        assert!((3.0..8.0).contains(&found.highest_per_s), "{found:?}");
+        assert_eq!(found.idle_share, 1.0);
+        assert_eq!(hot(steady(5.0, (320, 270), 0), 0.0).pixels, []);
+    }
+
+    #[test]
+    fn a_pixel_that_presses_excite_is_not_hot() {
+        // The skin relaxes after each press at this place: events in every idle time, and ten times as many in every window.
+        let mut events = Vec::new();
+        for window in windows() {
+            events.extend((0..2).map(|i| event(window.idle_start_us + 1000 * i, 320, 270)));
+            events.extend((0..16).map(|i| event(window.start_us + 1000 * i, 320, 270)));
+        }
+        assert_eq!(hot(events.clone(), 10.0).pixels, []);
+        // Without the presses it is.
+        events.retain(|e| e.t_us % 2_000_000 < 1_000_000);
+        assert_eq!(hot(events, 10.0).pixels, [(320, 270)]);
+    }
+
+    #[test]
+    fn a_disturbance_between_two_presses_and_a_dense_background_are_not_hot() {
+        let once = (0..5000).map(|i| event(600_000 + i, 320, 270)).collect();
+        assert_eq!(hot(once, 10.0).pixels, []);
+        // Every pixel fires five times a second.
+        let mut rng = seeded::generator(3, 0);
+        let mut random = |n: u64| seeded::index(&mut rng, n as usize) as u64;
+        let dense = (0..640 * 176 * 5 * 80 / 4).map(|_| {
+            event(
+                random(80_000_000),
+                random(640) as u16,
+                185 + random(176) as u16,
+            )
+        });
+        assert_eq!(hot(dense.collect(), 10.0).pixels, []);
+    }
+
+    #[test]
+    fn a_mask_holds_its_pixels_and_no_others() {
+        let mask = HotPixelMask::new(&HotPixels {
+            pixels: vec![(639, 200), (0, 201)],
+            ..HotPixels::default()
+        });
+        let held = |x, y| mask.holds(&event(0, x, y));
+        assert!(held(639, 200) && held(0, 201));
+        assert!(!held(638, 200) && !held(639, 201) && !held(0, 479) && !held(0, 200));
+        assert!(
+            !HotPixelMask::default().holds(&event(0, 0, 0)) && HotPixelMask::default().is_empty()
+        );
+    }
+}
