@@ -12,8 +12,10 @@ use crate::segment::Window;
 /// Idle times in which a hot pixel fires, at least; and as a share of all.
 const LEAST_SPANS: u32 = 4;
 const LEAST_SHARE: f64 = 0.25;
+/// Events of a hot pixel in idle time, at least: fewer are too few to tell it from one that fades after presses, and to matter.
+const LEAST_EVENTS: u32 = 20;
 /// Rate during presses of a hot pixel, at most, in idle rates: presses excite the others more.
-const MOST_EXCITED: f64 = 3.0;
+const MOST_EXCITED: f64 = 2.0;
 
 /// A span of camera time, half-open, µs.
 #[derive(Debug, Clone, Copy)]
@@ -129,10 +131,12 @@ impl PixelCounts {
             .collect::<Vec<_>>()[..];
         let middle = counts.len() / 2;
         let median = f64::from(*counts.select_nth_unstable(middle).1);
-        let mut hot_events = 0;
+        let pressed: u64 = self.pixels.iter().map(|p| u64::from(p.press_events)).sum();
+        let (mut hot_events, mut hot_pressed) = (0, 0);
         for (index, pixel) in self.pixels.iter().enumerate() {
             let idle = f64::from(pixel.idle_events);
             let is_hot = pixel.spans >= least_spans
+                && pixel.idle_events >= LEAST_EVENTS
                 && idle >= settings.hot_pixel_ratio * median
                 && f64::from(pixel.press_events) * idle_s <= MOST_EXCITED * idle * press_s;
             if is_hot {
@@ -143,9 +147,15 @@ impl PixelCounts {
                 found.pixels.push((column as u16, self.rows.0 + row as u16));
                 found.highest_per_s = found.highest_per_s.max(idle / idle_s);
                 hot_events += u64::from(pixel.idle_events);
+                hot_pressed += u64::from(pixel.press_events);
             }
         }
         found.idle_share = hot_events as f64 / all.max(1) as f64;
+        // A camera that sees nothing else in the press windows is blind, and the audit says so of the pixels that it has.
+        let windows = self.spans.iter().filter(|s| s.idle.is_none()).count() as u64;
+        if pressed - hot_pressed < windows {
+            found.pixels.clear();
+        }
         found
     }
 }
@@ -234,7 +244,14 @@ mod tests {
         events
     }
 
-    fn hot(mut events: Vec<CdEvent>, ratio: f64) -> HotPixels {
+    fn hot(events: Vec<CdEvent>, ratio: f64) -> HotPixels {
+        // Every press excites a pixel of its own.
+        let presses = windows().into_iter().zip(0..);
+        let presses = presses.flat_map(|(w, x)| (0..5).map(move |i| event(w.start_us + i, x, 190)));
+        alone([events, presses.collect()].concat(), ratio)
+    }
+
+    fn alone(mut events: Vec<CdEvent>, ratio: f64) -> HotPixels {
         events.sort_by_key(|e| e.t_us);
         let mut counts = PixelCounts::new(ROWS, &windows());
         counts.add(&events);
@@ -290,6 +307,12 @@ mod tests {
             )
         });
         assert_eq!(hot(dense.collect(), 10.0).pixels, []);
+    }
+
+    #[test]
+    fn a_camera_with_nothing_else_has_no_hot_pixels() {
+        assert_eq!(alone(steady(5.0, (320, 270), 0), 10.0).pixels, []);
+        assert_eq!(hot(steady(5.0, (320, 270), 0), 10.0).pixels, [(320, 270)]);
     }
 
     #[test]

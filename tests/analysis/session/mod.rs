@@ -292,6 +292,41 @@ fn retained_events_are_those_of_the_chosen_presses() {
 }
 
 #[test]
+fn hot_pixels_change_nothing_but_a_warning() {
+    const HOT: [(u16, u16); 3] = [(100, 200), (320, 270), (600, 350)];
+    let (mut input, mut source) = session();
+    let clean = analyze(&input, &source).unwrap();
+    for events in &mut source.events {
+        let end_us = events.last().unwrap().t_us;
+        for ((x, y), shift) in HOT.into_iter().zip(1..) {
+            events.extend((0..end_us / 2_000).map(|n| CdEvent {
+                t_us: 2_000 * n + 300 * shift,
+                x,
+                y,
+                polarity: Polarity::from_bit(n % 2 == 0),
+            }));
+        }
+        events.sort_by_key(|e| e.t_us);
+    }
+    let found = analyze(&input, &source).unwrap();
+    for (camera, hot) in found.hot_pixels.iter().enumerate() {
+        assert_eq!(hot.pixels, HOT, "camera {camera}");
+        assert!((450.0..550.0).contains(&hot.highest_per_s), "{hot:?}");
+    }
+    let is_hot = |w: &&skinrig_analysis::result::Warning| {
+        matches!(w.cause, WarningCause::HotPixels { pixels: 3, .. })
+    };
+    assert_eq!(found.warnings.iter().filter(is_hot).count(), 2);
+    let rmse = |a: &skinrig_analysis::Analysis| a.scored.rmse_mm.value.unwrap();
+    assert!((rmse(&found) / rmse(&clean) - 1.0).abs() < 0.05);
+    assert_eq!(found.scored.rmse_mm.n, 25);
+    input.settings.hot_pixel_ratio = 0.0;
+    let spoilt = analyze(&input, &source).unwrap();
+    assert!(spoilt.hot_pixels.iter().all(|hot| hot.pixels.is_empty()));
+    assert!(rmse(&spoilt) > 3.0 * rmse(&clean), "{}", rmse(&spoilt));
+}
+
+#[test]
 fn a_background_that_makes_clusters_of_its_own_is_called_out() {
     let (mut input, source) = session();
     // About 40 background events in a press window: 0.1 of them in a neighbourhood of 10 px.

@@ -204,6 +204,23 @@ fn of_positions() -> Vec<(Value, &'static str)> {
              viewing angle scatters by 12 degrees (camera 1; the other camera likewise)",
         ),
         (
+            json!({"kind": "fixed_stretch", "camera": "camera1", "first": 11, "last": 30, "column_px": 320.0,
+                "angle_deg": 12.0, "presses": 20}),
+            "expected columns that move with the presses, found them at column 320 from press 12 to press 31 while the \
+             viewing angle scatters by 12 degrees (camera 1, n 20 presses)",
+        ),
+        (
+            json!({"kind": "clock_step", "camera": "camera1", "both": true, "last": 10, "first": 11, "at_s": 432.1,
+                "step_s": -0.6, "explained": 118, "one_offset": 71, "presses": 125}),
+            "expected the clock of camera 1 to run evenly, found it step by about -0.6 s between press 11 and press 12, at \
+             432 s: with the step 118 of 125 presses have a burst, without it 71; the other camera likewise",
+        ),
+        (
+            json!({"kind": "marks_step", "camera": "camera2", "step_ms": 450.0, "from_s": 10.0, "to_s": 11.5, "marks": 40}),
+            "expected the clock of camera 2 to run evenly, found it step by +450.0 ms between the trigger marks at \
+             10.0 s and 11.5 s (n 40 marks)",
+        ),
+        (
             json!({"kind": "repetition_moved", "repetition": 2, "moved_px": 3.0, "error_px": 0.2,
                 "camera": "camera1", "pairs": 25}),
             "expected centroids at the same columns in each repetition, found repetition 2 moved by 3.0 ± 0.2 px (camera 1, n \

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::support::{Lab, read_json, skinrig, text};
+use crate::support::{Lab, SMALL, only, read_json, skinrig, text};
 
 /// A challenge of four calibrating and four scored presses.
 struct Challenge {
@@ -260,7 +260,11 @@ fn a_wrong_table_is_refused_with_its_row() {
 #[test]
 fn an_invalid_session_makes_no_challenge() {
     let lab = Lab::new();
-    let session = lab.record("s", &["--fault", "box-noisy@arming"]);
+    let sessions = lab.text("s");
+    let noisy = ["--no-analysis", "--fault", "box-noisy@arming"];
+    // The device failed, and all presses are done.
+    skinrig(&[&["run", SMALL, "--sessions", &sessions], &noisy[..]].concat()).code(3);
+    let session = only(&lab.path("s"), ".session.sqlite");
     let folder = lab.path("challenge");
     let arguments = [
         "challenge",

@@ -150,7 +150,7 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
             .code(2)
             .expect_stderr(&["--max-rmse"]);
     }
-    // A limit is not met when no press is located.
+    // A session without events is INVALID, whatever the limit.
     skinrig(&[
         "run",
         SMALL,
@@ -162,7 +162,7 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
         "100",
     ])
     .code(4)
-    .expect_stderr(&["no scored press was located"]);
+    .expect_stderr(&["INVALID", "no events"]);
 }
 
 #[test]
