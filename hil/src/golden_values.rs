@@ -32,7 +32,7 @@ const CLOCK_METRICS: [&str; 8] = [
 
 /// Adds the metrics of `analysis` to `findings`, and evidence of problems that make them unreliable.
 /// `lost_bytes` is by camera.
-pub fn add(analysis: &Analysis, lost_bytes: [u64; 2], findings: &mut Findings) {
+pub(crate) fn add(analysis: &Analysis, lost_bytes: [u64; 2], findings: &mut Findings) {
     golden_evidence::add(analysis, lost_bytes, findings);
     if !analysis.is_valid() {
         // Without clocks no event can be assigned to a press.

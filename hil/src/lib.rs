@@ -9,7 +9,7 @@ pub mod checks;
 pub mod device_evidence;
 pub mod findings;
 mod golden_evidence;
-pub mod golden_values;
+mod golden_values;
 pub mod history;
 pub mod lease;
 pub mod night_folder;

@@ -220,9 +220,14 @@ mod tests {
 
     #[test]
     fn a_step_is_found_with_its_place_and_size() {
-        for n in [30, 100, 300] {
+        // Near the ends of a short session too few presses lie on one side of the step.
+        for (n, shares) in [
+            (30, &[0.5][..]),
+            (100, &[0.2, 0.5, 0.8]),
+            (300, &[0.2, 0.5, 0.8]),
+        ] {
             let listed = path(n);
-            for share in [0.3, 0.5, 0.8] {
+            for share in shares {
                 let from = (share * f64::from(n)) as usize;
                 for by_s in [0.35, -0.35, 0.6, -0.6, 0.9, 5.4, 50.9] {
                     let found = step(&listed, &stepped(&listed, from, by_s));

@@ -206,13 +206,13 @@ fn of_positions() -> Vec<(Value, &'static str)> {
         (
             json!({"kind": "fixed_stretch", "camera": "camera1", "first": 11, "last": 30, "column_px": 320.0,
                 "angle_deg": 12.0, "presses": 20}),
-            "expected columns that move with the presses, found them at column 320 from press 12 to press 31 while the \
+            "expected columns that move with the presses, found them at column 320 from press 11 to press 30 while the \
              viewing angle scatters by 12 degrees (camera 1, n 20 presses)",
         ),
         (
             json!({"kind": "clock_step", "camera": "camera1", "both": true, "last": 10, "first": 11, "at_s": 432.1,
                 "step_s": -0.6, "explained": 118, "one_offset": 71, "presses": 125}),
-            "expected the clock of camera 1 to run evenly, found it step by about -0.6 s between press 11 and press 12, at \
+            "expected the clock of camera 1 to run evenly, found it step by about -0.6 s between press 10 and press 11, at \
              432 s: with the step 118 of 125 presses have a burst, without it 71; the other camera likewise",
         ),
         (
