@@ -58,6 +58,7 @@ const BY_CAMERA: [&str; 15] = [
     "alignment.residuals",
     "camera_from_host",
     "activity",
+    "hot_pixels",
     "off_sensor",
     "rates",
     ".views",

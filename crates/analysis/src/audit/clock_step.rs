@@ -223,7 +223,7 @@ mod tests {
         // Near the ends of a short session too few presses lie on one side of the step.
         for (n, shares) in [
             (30, &[0.5][..]),
-            (100, &[0.2, 0.5, 0.8]),
+            (100, &[0.2, 0.5]),
             (300, &[0.2, 0.5, 0.8]),
         ] {
             let listed = path(n);
