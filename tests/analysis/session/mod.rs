@@ -298,10 +298,10 @@ fn hot_pixels_change_nothing_but_a_warning() {
     let (mut input, mut source) = session();
     let clean = analyze(&input, &source).unwrap();
     for events in &mut source.events {
-        let end_us = events.last().unwrap().t_us;
+        let (start_us, end_us) = (events[0].t_us, events.last().unwrap().t_us);
         for ((x, y), shift) in HOT.into_iter().zip(1..) {
-            events.extend((0..end_us / 2_000).map(|n| CdEvent {
-                t_us: 2_000 * n + 300 * shift,
+            events.extend((0..(end_us - start_us) / 2_000).map(|n| CdEvent {
+                t_us: start_us + 2_000 * n + 300 * shift,
                 x,
                 y,
                 polarity: Polarity::from_bit(n % 2 == 0),
