@@ -47,7 +47,7 @@ fn mirror(session: &mut Session) {
 }
 
 /// Kinds of figures that belong to one camera by their index.
-const BY_CAMERA: [&str; 15] = [
+const BY_CAMERA: [&str; 16] = [
     "runner_up_s",
     "geometry.cameras",
     "start.cameras",

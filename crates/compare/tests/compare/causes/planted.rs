@@ -166,6 +166,8 @@ fn input(config: &SimConfig, plant: PlantedCause) -> SessionInput {
         } else {
             1
         },
+        // Planted noise shall matter: the analysis keeps it out of the clusters otherwise.
+        background_margin: 0.0,
         ..AnalysisSettings::default()
     };
     skinrig_planted::session(rig, settings)
