@@ -256,9 +256,6 @@ impl<'a> Accumulator<'a> {
             room[at..=at].copy_from_slice(std::slice::from_ref(event));
             count += usize::from((low <= event.y) & (event.y <= high));
         }
-        if let Some(rates) = &mut self.rates {
-            rates.add_in_order(&inside[..count]);
-        }
         if let Some(pixels) = &mut self.pixels {
             pixels.add(&inside[..count]);
         }
@@ -292,6 +289,9 @@ impl<'a> Accumulator<'a> {
 
     /// Processes events that count, in time order.
     fn take_counted(&mut self, events: &[CdEvent]) {
+        if let Some(rates) = &mut self.rates {
+            rates.add_in_order(events);
+        }
         let mut rest = events;
         while let Some(first) = rest.first()
             && self.error.is_none()

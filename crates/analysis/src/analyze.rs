@@ -2,7 +2,7 @@
 
 use skinrig_model::CameraId;
 
-use crate::accumulate::{Accumulator, PassOutput, PassRequest, SLACK_US, pass};
+use crate::accumulate::{Accumulator, PassOutput, PassRequest, SLACK_US, pass, rate_bin_us};
 use crate::audit::Streams;
 use crate::calibrate::SessionCalibration;
 use crate::camera_clocks::{CameraClock, CameraClocks};
@@ -444,7 +444,10 @@ fn camera_pass(
             None => events.count(PixelCounts::new(settings.crop_v[k], &list))?,
         };
         hot_pixels = pixels.hot(settings);
+        // Where only hot pixels fire, the camera is silent.
+        let any_hot = !hot_pixels.pixels.is_empty();
         let wanted = PassRequest {
+            rates: any_hot.then(|| RateHistogram::new(rate_bin_us(settings))),
             windows: &list,
             pictured: &plan.pictures,
             zooms: zoom_plans(input, plan, &clock),
@@ -456,7 +459,7 @@ fn camera_pass(
         collected = events.pass(Accumulator::new(camera, settings, wanted))?;
     }
     collected = PassOutput {
-        rates,
+        rates: collected.rates.take().or(rates),
         activity,
         off_sensor,
         ..collected

@@ -8,7 +8,9 @@ use rayon::prelude::*;
 use rigs::{Random, Session, SessionOptions, session, sound};
 use skinrig_analysis::result::{Evidence, Fault, Finding, WarningCause};
 use skinrig_analysis::{Analysis, SessionInput, analyze};
-use skinrig_model::{Causes, HostTime, InvalidReason, Point2, PressFault, PressVerdict};
+use skinrig_model::{
+    AnalysisSettings, Causes, HostTime, InvalidReason, Point2, PressFault, PressVerdict, Verdict,
+};
 
 fn run(session: &Session) -> Analysis {
     analyze(&session.input, &session.events).unwrap()
@@ -278,27 +280,64 @@ fn a_camera_that_does_not_see_the_presses() {
     });
 }
 
-/// One camera's columns stop to follow, from some press on: the presses were located with columns that are not theirs.
-#[test]
-fn a_camera_that_sticks_on_a_pixel_for_a_part_of_the_session() {
+/// A camera that sticks on one pixel from some press on; `ratio`: that of hot pixels.
+fn stuck(seed: u64, from_share: f64, ratio: f64) -> Session {
     let long = SessionOptions {
         places: 20,
         ..SessionOptions::default()
     };
+    let mut s = session(seed, long);
+    s.input.settings.hot_pixel_ratio = ratio;
+    let events = &mut s.events.events[(seed % 2) as usize];
+    let from = (from_share * events.len() as f64) as usize;
+    let column = [30, 150, 320, 500][(seed % 4) as usize];
+    for e in &mut events[from..] {
+        (e.x, e.y) = (column, 270);
+    }
+    s
+}
+
+/// One camera's columns stop to follow, from some press on: the presses were located with columns that are not theirs.
+#[test]
+fn a_camera_that_sticks_on_a_pixel_for_a_part_of_the_session() {
     for share in [0.0, 0.4, 0.7] {
         names(Fault::CameraBlind, |seed| {
-            let mut s = session(seed, long);
-            // As a hot pixel its events would not count, and the presses would have no position.
-            s.input.settings.hot_pixel_ratio = 0.0;
-            let events = &mut s.events.events[(seed % 2) as usize];
-            let from = (share * events.len() as f64) as usize;
-            let column = [30, 150, 320, 500][(seed % 4) as usize];
-            for e in &mut events[from..] {
-                (e.x, e.y) = (column, 270);
-            }
+            let s = stuck(seed, share, 0.0);
             assert!(!run(&s).is_valid(), "seed {seed}");
             s
         });
+    }
+}
+
+/// As a hot pixel it does not count, and the camera is silent from then on. A finding says so; if the session is valid, no press of
+/// that part is.
+#[test]
+fn a_camera_that_sticks_on_a_hot_pixel_is_silent() {
+    let ratio = AnalysisSettings::default().hot_pixel_ratio;
+    for share in [0.4, 0.7] {
+        for seed in 0..SEEDS {
+            let a = run(&stuck(seed, share, ratio));
+            let silent = [
+                Fault::CameraBlind,
+                Fault::RecordingShort,
+                Fault::RecordingGap,
+            ];
+            let is_named = a.findings.iter().any(|f| silent.contains(&f.fault));
+            assert!(is_named, "seed {seed}, from {share}: {:#?}", a.findings);
+            if !a.is_valid() {
+                continue;
+            }
+            let from = (share * a.presses.len() as f64) as usize + 2;
+            let valid = a.presses[from..]
+                .iter()
+                .filter(|p| p.verdict == Verdict::Valid);
+            assert_eq!(
+                valid.count(),
+                0,
+                "seed {seed}, from {share}: {:#?}",
+                a.findings
+            );
+        }
     }
 }
 
