@@ -9,6 +9,19 @@ use crate::exit::Failure;
 /// The ending of every session file.
 pub(crate) const SESSION_SUFFIX: &str = ".session.sqlite";
 
+/// Reads a text file that the user names; `next` is what to do if it cannot be read.
+///
+/// # Errors
+/// [`Failure::input`] when it cannot be read.
+pub(crate) fn read_input(path: &Path, next: &str) -> Result<Vec<u8>, Failure> {
+    skinrig_formats::regular::read_text(path).map_err(|e| {
+        Failure::input(format!(
+            "{}: cannot read: {e}\n  next: {next}",
+            path.display()
+        ))
+    })
+}
+
 /// Path of a new session in `folder` (created if missing): `<UTC time>-<protocol>-<prototype>.session.sqlite`,
 /// with a number if that name is taken.
 ///

@@ -36,17 +36,6 @@ impl Phase {
     pub(crate) fn steps(text: &str, count: u32) -> Self {
         let phase = Self::draw(
             text,
-            "{spinner} {msg}, {pos} of {len}, {elapsed}",
-            |style| style,
-        );
-        phase.0.set_length(u64::from(count));
-        phase
-    }
-
-    /// Like [`Self::steps`], with a bar.
-    pub(crate) fn bar(text: &str, count: u32) -> Self {
-        let phase = Self::draw(
-            text,
             "{spinner} {msg} {bar:20} {pos} of {len}, {elapsed}",
             |style| style,
         );

@@ -208,13 +208,7 @@ fn is_near(times: &[f64], at: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Three sync presses 1 s apart, a pause, then `n` presses every 2 s.
-    fn path(n: u32) -> Vec<f64> {
-        let sync = (0..3).map(f64::from);
-        sync.chain((0..n).map(|i| 6.0 + 2.0 * f64::from(i)))
-            .collect()
-    }
+    use crate::audit::even_path::path;
 
     fn stepped(all: &[f64], from: usize, by_s: f64) -> Vec<f64> {
         let moved = |(i, t): (usize, &f64)| if i < from { *t } else { t + by_s };

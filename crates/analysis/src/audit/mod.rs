@@ -10,6 +10,8 @@ mod clock_step;
 mod commanded;
 mod complete;
 mod drift;
+#[cfg(test)]
+mod even_path;
 mod finding;
 mod fixed_pixel;
 mod follow;

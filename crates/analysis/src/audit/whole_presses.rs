@@ -124,13 +124,7 @@ fn explained(listed: &[f64], contacts: &[f64], shift_s: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Three sync presses 1 s apart, a pause, then `n` presses every 2 s.
-    fn path(n: u32) -> Vec<f64> {
-        let sync = (0..3).map(f64::from);
-        sync.chain((0..n).map(|i| 6.0 + 2.0 * f64::from(i)))
-            .collect()
-    }
+    use crate::audit::even_path::path;
 
     fn moved(all: &[f64], by_s: f64) -> Vec<f64> {
         all.iter().map(|t| t + by_s).collect()

@@ -24,11 +24,7 @@ pub(super) fn choices(args: &CompareArgs) -> Result<ComparisonOptions, Failure> 
     let file = named.or_else(|| Some(Path::new(FILE)).filter(|p| p.is_file()));
     let read = file.map(|path| {
         let name = path.display().to_string();
-        let bytes = skinrig_formats::regular::read_text(path).map_err(|e| {
-            Failure::input(format!(
-                "{name}: cannot read: {e}\n  next: name a limits file with --limits"
-            ))
-        })?;
+        let bytes = crate::paths::read_input(path, "name a limits file with --limits")?;
         Limits::parse(&name, &bytes).map_err(|found| Failure::findings(&found))
     });
     let mut limits = read.transpose()?.unwrap_or(Limits {

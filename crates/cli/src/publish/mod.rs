@@ -98,12 +98,8 @@ fn print(args: &PublishArgs, headline: &Headline, json: bool) {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    skinrig_formats::regular::read_text(path).map_err(|e| {
-        Failure::input(format!(
-            "{}: cannot read: {e}\n  next: `skinrig schema publication` has the keys of the file for --about",
-            path.display()
-        ))
-    })
+    let next = "`skinrig schema publication` has the keys of the file for --about";
+    crate::paths::read_input(path, next)
 }
 
 /// Session files, or one selection.

@@ -37,7 +37,7 @@ pub(crate) fn reanalyze(args: &ReanalyzeArgs, output: Output) -> Outcome {
         .collect();
     let to_do: Vec<Request> = open.iter().map(|at| requests[*at].clone()).collect();
     let mut finished = 0;
-    let phase = Phase::bar("analysing sessions", to_do.len() as u32);
+    let phase = Phase::steps("analysing sessions", to_do.len() as u32);
     let mut each = |at: usize, answer: Answered| {
         finished += 1;
         phase.step(finished);
@@ -55,13 +55,9 @@ pub(crate) fn reanalyze(args: &ReanalyzeArgs, output: Output) -> Outcome {
 }
 
 fn settings(path: &Path) -> Result<NewSettings, Failure> {
-    let name = path.display().to_string();
-    let bytes = skinrig_formats::regular::read_text(path).map_err(|e| {
-        Failure::input(format!(
-            "{name}: cannot read: {e}\n  next: write a file of settings; `skinrig schema settings` has its keys"
-        ))
-    })?;
-    NewSettings::parse(&name, &bytes).map_err(|f| Failure::findings(&f))
+    let next = "write a file of settings; `skinrig schema settings` has its keys";
+    let bytes = crate::paths::read_input(path, next)?;
+    NewSettings::parse(&path.display().to_string(), &bytes).map_err(|f| Failure::findings(&f))
 }
 
 /// One request per session, each session once.

@@ -142,11 +142,7 @@ pub(crate) fn sessions(argument: &Path) -> Result<Targets, Failure> {
 
 fn read(path: &Path) -> Result<Selection, Failure> {
     let name = path.display().to_string();
-    let bytes = skinrig_formats::regular::read_text(path).map_err(|e| {
-        Failure::input(format!(
-            "{name}: cannot read: {e}\n  next: write a selection with `skinrig select`"
-        ))
-    })?;
+    let bytes = crate::paths::read_input(path, "write a selection with `skinrig select`")?;
     let folder = folder_of(path);
     Selection::parse(&name, &bytes, &|file| look_up(folder, file))
         .map_err(|f| Failure::findings(&f))
