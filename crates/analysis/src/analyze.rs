@@ -37,8 +37,8 @@ use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, red
 /// Windows that overlap by less than this only touch, because their ends are rounded, µs.
 const OVERLAP_US: u64 = 100;
 
-/// Analyses a session. Each camera needs two passes over its events: the first finds event rates and hot pixels, the second
-/// fills the press windows; both cameras run in parallel. The second pass uses cached events of the crop. It reads
+/// Analyses a session. The first pass over a camera's events finds event rates and, where its clock is known before, hot pixels; the
+/// last one fills the press windows. Both cameras run in parallel. Later passes use cached events of the crop. Each reads
 /// them again if a camera has more than 2^25, or if some were too late for their windows.
 ///
 /// The result is bit-identical for the same input on the same machine. Memory does not grow with the number of events,
