@@ -1,6 +1,7 @@
 //! Check `reaction`: a campaign that feels its presses while it records.
 
 use skinrig_analysis::result::FeltTouches;
+use skinrig_nightly::EvidenceKind;
 use skinrig_protocol::suite::{Check, Measure};
 
 use super::golden::{campaign, unmeasured_if_missing};
@@ -22,8 +23,13 @@ pub(super) fn reaction(check: &Check, bench: &mut dyn Bench, findings: &mut Find
     {
         golden_evidence::add(analysis, run.lost_bytes, findings);
         if analysis.is_valid() {
-            if let Some(felt) = &analysis.felt {
-                values(felt, findings);
+            match &analysis.felt {
+                Some(felt) => values(felt, findings),
+                None => findings.add_evidence(
+                    EvidenceKind::TimeOut,
+                    "computer",
+                    never_felt(&run.files.session),
+                ),
             }
             match bench.compare_online(&run.files) {
                 Ok(comparison) => differences(comparison, findings),
@@ -35,6 +41,14 @@ pub(super) fn reaction(check: &Check, bench: &mut dyn Bench, findings: &mut Find
         }
     }
     unmeasured_if_missing(check, findings);
+}
+
+/// A run does not wait for learning: on a slow computer it may end before.
+fn never_felt(session: &str) -> String {
+    format!(
+        "expected the run to feel from its first scored press on, found that it never began: learning failed or lasted until \
+         the end; `skinrig show {session}` has the reason"
+    )
 }
 
 /// What was felt while the session was recorded, against its analysis.

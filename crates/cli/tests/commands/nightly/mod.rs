@@ -267,7 +267,7 @@ fn name_the_golden_session() {
     );
 }
 
-/// The campaign of the starter files, a little faster.
+/// The campaign of the starter files, a little faster, with a pause to learn in.
 #[test]
 fn presses_are_felt_and_replayed_to_the_bit() {
     in_real_time(feel_presses);
@@ -281,7 +281,10 @@ fn feel_presses() {
     let protocol = fs::read_to_string(Path::new(ROOT).join("hil/reaction.yaml")).unwrap();
     fs::write(
         place("reaction.yaml"),
-        protocol.replace("period: 2 s", "period: 1.5 s"),
+        protocol.replace("period: 2 s", "period: 1.5 s").replace(
+            "  count: 3\n\ndepth",
+            "  count: 3\n  between: {pause: 10 s}\n\ndepth",
+        ),
     )
     .unwrap();
     let suite = format!(
@@ -296,12 +299,17 @@ fn feel_presses() {
         "PASS",
         "{all}"
     );
-    // On a busy machine learning takes so long that few presses are left to feel.
-    let felt = observed.metric_verdict("reaction", "skin", "felt");
-    assert_ne!(felt, "FAIL", "{all}");
+    // On a busy machine learning lasts so long that few presses are left to feel, or none; then the check says so.
+    let felt = observed.value("reaction", "skin", "felt");
     let reaction_s = observed.value("reaction", "skin", "reaction");
     assert!(reaction_s.is_none_or(|s| s > 0.0), "{all}");
-    assert!(felt != "PASS" || reaction_s.is_some(), "{all}");
+    if felt.is_none() {
+        assert!(all.contains("it never began"), "{all}");
+    } else {
+        let verdict = observed.metric_verdict("reaction", "skin", "felt");
+        assert_ne!(verdict, "FAIL", "{all}");
+        assert!(verdict != "PASS" || reaction_s.is_some(), "{all}");
+    }
     // Other campaigns than the golden one are no golden session.
     assert!(observed.night["golden"].is_null(), "{all}");
 }
