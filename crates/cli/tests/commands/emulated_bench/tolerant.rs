@@ -172,7 +172,13 @@ fn tolerate_then_accept() {
         "{}",
         all_output(&refused)
     );
-    let resumed = resume(&["--tolerant"]);
+    // A failing transfer may cost a press all of its retakes; another leg takes such presses again.
+    let mut resumed = resume(&["--tolerant"]);
+    for _ in 0..2 {
+        if !resumed.status.success() && all_output(&resumed).contains("with `skinrig resume") {
+            resumed = resume(&["--tolerant"]);
+        }
+    }
     assert!(resumed.status.success(), "{}", all_output(&resumed));
     let verified = skinrig(&bench, &["verify", session.to_str().unwrap()]);
     assert!(verified.status.success(), "{}", all_output(&verified));
