@@ -31,10 +31,12 @@ pub(super) fn reaction(check: &Check, bench: &mut dyn Bench, findings: &mut Find
                     never_felt(&run.files.session),
                 ),
             }
-            match bench.compare_online(&run.files) {
-                Ok(comparison) => differences(comparison, findings),
-                Err(why) => findings.evidence.push(*why),
-            }
+        }
+        // Equal or not, whatever the analysis says of the session; what it found explains why there may be nothing to compare.
+        match bench.compare_online(&run.files) {
+            Ok(comparison) => differences(comparison, findings),
+            Err(why) if analysis.is_valid() => findings.evidence.push(*why),
+            Err(_) => {}
         }
         for value in &mut findings.values {
             value.with_note(format!("session {}", run.files.session));

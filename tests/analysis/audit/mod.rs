@@ -521,6 +521,25 @@ fn sessions_too_small_to_judge_are_not_accused() {
     assert_eq!(named(&run(&refused).findings), [Fault::RobotOff]);
 }
 
+/// On a very uneven skin the fit of another order may leave out the few presses that it moves.
+#[test]
+fn a_list_is_reordered_only_by_the_presses_that_it_moves() {
+    let options = SessionOptions {
+        rig: Some(0),
+        uneven_px: 30.0,
+        ..SessionOptions::default()
+    };
+    let alarms: Vec<(u64, Vec<Finding>)> = (0..200)
+        .into_par_iter()
+        .map(|seed| (seed, run(&session(1000 * seed + 7, options)).findings))
+        .filter(|(_, found)| {
+            let accused = [Fault::OrderOfPresses, Fault::IndexShifted];
+            found.iter().any(|f| accused.contains(&f.fault))
+        })
+        .collect();
+    assert!(alarms.is_empty(), "{} of 200: {alarms:#?}", alarms.len());
+}
+
 #[test]
 fn a_stream_out_of_order_is_named() {
     let mut s = sound(3);

@@ -59,6 +59,8 @@ pub(crate) struct SessionOptions {
     pub places: usize,
     /// Number of repetitions (0: from the seed).
     pub repetitions: u32,
+    /// Standard deviation of what the skin displaces the columns at each location, alike in every repetition, px.
+    pub uneven_px: f64,
     /// Shift of camera 2's columns in the second repetition, px.
     pub move_px: f64,
     /// Camera 2 sees the press this many rows later, so that every window has a burst, of another press.
@@ -204,6 +206,11 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
             ..AnalysisSettings::default()
         },
     );
+    let mut uneven = Random::new(!seed);
+    let uneven: Vec<[f64; 2]> = path
+        .iter()
+        .map(|_| [0, 1].map(|_| wishes.uneven_px * uneven.normal()))
+        .collect();
     let mut events = [Vec::new(), Vec::new()];
     for (role, repetition, location, at, contact) in planned {
         let touch = touch(
@@ -241,7 +248,8 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
                 0.0
             };
             let missed = role != PressRole::Sync && random.unit() < miss;
-            let centre = u + moved + 3.0 * random.normal();
+            let skin = uneven[location as usize][k];
+            let centre = u + moved + skin + 3.0 * random.normal();
             for n in 0..if missed { 0 } else { strength } {
                 let after = if 3 * n < 2 * strength {
                     0.1 * random.unit()

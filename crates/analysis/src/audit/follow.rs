@@ -106,8 +106,13 @@ fn another_reading(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding
     readings.push(path.as_planned());
     readings.extend(path.streams_apart());
     let judged = readings.iter().map(|r| path.score(r));
+    let reorders = |j: &ScoredReading<'_>| {
+        let fault = j.reading.fault;
+        matches!(fault, Some(Fault::OrderOfPresses | Fault::IndexShifted))
+    };
     let best = judged
         .filter(|j| j.follows(FOLLOWS))
+        .filter(|j| !reorders(j) || path.moved_presses_prefer(as_is, j))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     let gain = as_is.cost - best.cost;
     let fault = best.reading.fault?;

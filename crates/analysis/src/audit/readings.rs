@@ -365,6 +365,35 @@ impl<'a> Path<'a> {
         judged
     }
 
+    /// True if most columns of the presses that `other` moves lie closer to their viewing angles by it. The spreads of two
+    /// readings are medians: they cannot tell what a small part of the presses says, and the fit of the rest leaves them out.
+    pub(super) fn moved_presses_prefer(
+        &self,
+        as_is: &ScoredReading<'_>,
+        other: &ScoredReading<'_>,
+    ) -> bool {
+        let (mut closer, mut moved) = (0, 0);
+        for (i, touch) in self.presses_seen.iter().enumerate() {
+            let (Some(here), Some(there)) = (as_is.reading.at[i], other.reading.at[i]) else {
+                continue;
+            };
+            if here == there {
+                continue;
+            }
+            for k in 0..2 {
+                let (Some(column), Some(own), Some(theirs)) =
+                    (touch.sights[k].column, &as_is.fits[k], &other.fits[k])
+                else {
+                    continue;
+                };
+                let off = residual_deg(&own.camera, column, here).abs();
+                moved += 1;
+                closer += usize::from(residual_deg(&theirs.camera, column, there).abs() < off);
+            }
+        }
+        2 * closer > moved
+    }
+
     /// Columns of stream `k` and positions by `reading`.
     fn pairs(&self, reading: &Reading, k: usize) -> Vec<(f64, Point2)> {
         let presses = self.presses_seen.iter().enumerate().step_by(self.stride);

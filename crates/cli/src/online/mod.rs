@@ -272,6 +272,12 @@ fn open_replayable(session: &Path) -> Result<(SessionReader, Analysis), Failure>
             legs.len() + 1
         )));
     }
+    Ok((reader, analysis))
+}
+
+/// As [`open_replayable`]; an INVALID session has nothing to learn from.
+fn open_valid(session: &Path) -> Result<(SessionReader, Analysis), Failure> {
+    let (reader, analysis) = open_replayable(session)?;
     if !analysis.is_valid() {
         return Err(Failure::limit(format!(
             "{0}: expected a valid session, found an INVALID one: {1}\n  next: `skinrig analyze {0}` says what to mend",
@@ -313,7 +319,7 @@ pub(crate) fn compare(session: &Path) -> Result<Compared, Failure> {
 /// # Errors
 /// When the session cannot be read or analysed, or has too few calibration presses to learn from.
 pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
-    let (reader, analysis) = open_replayable(&args.session)?;
+    let (reader, analysis) = open_valid(&args.session)?;
     let header = reader.header().map_err(Failure::session)?;
     let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
     let skin = learn(args, &analysis)?;

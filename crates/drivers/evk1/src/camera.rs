@@ -358,6 +358,9 @@ impl Evk1 {
             triggers::write(&mut registers, &channels)?;
         }
         let overflow_hits = registers.read(OVERFLOW_HITCOUNT)? as u16;
+        if self.config.overflow_is_loss && overflow_hits == u16::MAX {
+            return Err(Evk1Error::OverflowCounterFull);
+        }
         let inbox = Arc::new(Inbox::new(
             self.config.chunk_bytes,
             self.config.backlog_bytes,

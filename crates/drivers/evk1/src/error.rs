@@ -146,6 +146,13 @@ pub enum Evk1Error {
         /// Bytes received after the stop.
         bytes: u64,
     },
+    /// The overflow counter is at its end before the stream, so that no overflow could be told from none.
+    #[error(
+        "expected an overflow counter that can count, found it at its end ({}): power-cycle the camera; if it stays there, set \
+         `overflow_counter: note` for this camera in the rig file",
+        u16::MAX
+    )]
+    OverflowCounterFull,
     /// A malformed line of a bias file.
     #[error("bias file, line {line}: expected {expected}, found {found}")]
     BiasFile {

@@ -76,9 +76,12 @@ fn tolerate_then_accept() {
             .order(CAMERA_SERIALS[1], order)
             .unwrap();
     };
-    order(DeviceCommand::FailReads(true));
-    order(DeviceCommand::FailResets(true));
-    order(DeviceCommand::IgnoreWrites(BIAS));
+    let misbehave = || {
+        order(DeviceCommand::FailReads(true));
+        order(DeviceCommand::FailResets(true));
+        order(DeviceCommand::IgnoreWrites(BIAS));
+    };
+    misbehave();
     let (one_press, strict) = (protocol(folder), rig(folder, ""));
     let run = |rig: &Path, name: &str, more: &[&str]| {
         let sessions = folder.join(name);
@@ -159,6 +162,10 @@ fn tolerate_then_accept() {
     }
     killed.kill().unwrap();
     killed.wait().unwrap();
+    // It goes on streaming with nobody reading and cannot be reset: on a slow computer its overflow counter fills, so reconnect it.
+    order(DeviceCommand::Unplug);
+    order(DeviceCommand::Plug);
+    misbehave();
     let session = only_file(&sessions, ".session.sqlite");
     let resume = |more: &[&str]| {
         let mut arguments = vec!["resume", session.to_str().unwrap(), "--no-analysis"];
@@ -172,13 +179,7 @@ fn tolerate_then_accept() {
         "{}",
         all_output(&refused)
     );
-    // A failing transfer may cost a press all of its retakes; another leg takes such presses again.
-    let mut resumed = resume(&["--tolerant"]);
-    for _ in 0..2 {
-        if !resumed.status.success() && all_output(&resumed).contains("with `skinrig resume") {
-            resumed = resume(&["--tolerant"]);
-        }
-    }
+    let resumed = resume(&["--tolerant"]);
     assert!(resumed.status.success(), "{}", all_output(&resumed));
     let verified = skinrig(&bench, &["verify", session.to_str().unwrap()]);
     assert!(verified.status.success(), "{}", all_output(&verified));

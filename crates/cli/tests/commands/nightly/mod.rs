@@ -294,17 +294,15 @@ fn feel_presses() {
     fs::write(place("suite.yaml"), suite).unwrap();
     let observed = nights.night("reaction");
     let all = format!("{:#}\n{}", observed.check("reaction"), observed.stderr);
-    assert_eq!(
-        observed.metric_verdict("reaction", "skin", "differences"),
-        "PASS",
-        "{all}"
-    );
-    // On a busy machine learning lasts so long that few presses are left to feel, or none; then the check says so.
+    // A busy machine may spoil the session, for other metrics: the replay repeats it all the same.
+    let differences = observed.value("reaction", "skin", "differences");
+    assert_eq!(differences, Some(0.0), "{all}");
+    // There learning may also last so long that few presses are left to feel, or none; then the check says so.
     let felt = observed.value("reaction", "skin", "felt");
     let reaction_s = observed.value("reaction", "skin", "reaction");
     assert!(reaction_s.is_none_or(|s| s > 0.0), "{all}");
     if felt.is_none() {
-        assert!(all.contains("it never began"), "{all}");
+        assert_eq!(observed.check("reaction")["verdict"], "INVALID", "{all}");
     } else {
         let verdict = observed.metric_verdict("reaction", "skin", "felt");
         assert_ne!(verdict, "FAIL", "{all}");

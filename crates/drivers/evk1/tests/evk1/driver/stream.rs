@@ -217,6 +217,27 @@ fn the_overflow_counter_is_read_around_the_stream() {
     assert!(notes.contains("from 7 to 9"), "{notes}");
 }
 
+/// A camera left streaming with nobody reading fills its counter; at its end every press would count as lossy.
+#[test]
+fn a_full_overflow_counter_is_refused_before_the_stream() {
+    let bench = Bench::new();
+    let counter = r::OVERFLOW_HITCOUNT.address;
+    let mut camera = bench.open().unwrap();
+    bench.model().registers.insert(counter, 0xffff);
+    let error = camera.start().unwrap_err().to_string();
+    assert!(error.contains("at its end (65535): power-cycle"), "{error}");
+    bench.model().registers.insert(counter, 0xfffe);
+    camera.start().unwrap();
+    let mut noted = bench
+        .open_with(Evk1Config {
+            overflow_is_loss: false,
+            ..Evk1Config::default()
+        })
+        .unwrap();
+    bench.model().registers.insert(counter, 0xffff);
+    noted.start().unwrap();
+}
+
 /// A flush reads the overflow counter; otherwise it is read once a second. The gap starts at the previous reading.
 #[test]
 fn a_step_of_the_overflow_counter_is_a_gap() {
