@@ -86,9 +86,14 @@ pub(super) fn trigger_loopback(check: &Check, bench: &mut dyn Bench, findings: &
         streams.pass(PAUSE, on_chunk);
     }
     streams.pass(MARGIN, on_chunk);
+    streams.wait_for_reports(&sent, on_chunk);
     let reports = trim_to_marks(streams.reports(), &sent);
-    let reports_complete = streams.box_reports_are_complete() && !has_missing_syncs(&reports);
+    let every_report_came = streams.box_reports_are_complete();
     let stats = streams.finish(findings, METRICS, on_chunk);
+    let seen = CameraId::ALL.map(|c| edges.on_channel(c, channels[c.index()]));
+    let reports_complete = every_report_came
+        && !has_missing_syncs(&reports)
+        && !has_unreported(&reports, &sent, &seen);
     if reports.iter().any(|r| matches!(r, BoxReport::Reset { .. })) {
         let what = "expected the box's clock to continue, found a reset of the box";
         let subject = device_evidence::subject(skinrig_model::DeviceRole::TriggerBox);
@@ -113,8 +118,7 @@ pub(super) fn trigger_loopback(check: &Check, bench: &mut dyn Bench, findings: &
             continue;
         }
         let channel = channels[camera.index()];
-        let line =
-            LineQuality::measure(&sent, &reports, &edges.on_channel(camera, channel), channel);
+        let line = LineQuality::measure(&sent, &reports, &seen[camera.index()], channel);
         line.report(subject, &edges.other_channels(camera, channel), findings);
     }
 }
@@ -239,7 +243,18 @@ fn has_missing_syncs(reports: &[BoxReport]) -> bool {
         .any(|c| c[1] != (c[0] + 1) & MAX_MARKED_PRESS)
 }
 
-/// Lost pulses. A mark without a report of the box counts as completely lost.
+/// Whether a camera read a mark in `sent` that `reports` does not have: it was sent, and nothing is known of its pulses.
+fn has_unreported(reports: &[BoxReport], sent: &[Mark], seen: &[Vec<TriggerEdge>; 2]) -> bool {
+    let is_reported = |sent: Mark| {
+        let of = |r: &BoxReport| matches!(r, BoxReport::Mark { mark, .. } if *mark == sent);
+        reports.iter().any(of)
+    };
+    let read = seen.iter().flat_map(|edges| decode_marks(edges).marks);
+    read.map(|m| m.mark)
+        .any(|mark| sent.contains(&mark) && !is_reported(mark))
+}
+
+/// Lost pulses. A mark that the box did not report, nor a camera read, was not sent: it counts as completely lost.
 fn lost_pulses(wire: &Wire, sent: &[Mark]) -> u64 {
     let is_ours = |t: &&WireTrain| matches!(t.label, Label::Mark(m) if sent.contains(&m));
     let known = wire.trains.iter().filter(is_ours).count();
@@ -251,7 +266,31 @@ fn lost_pulses(wire: &Wire, sent: &[Mark]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skinrig_model::BoxTime;
+    use skinrig_model::{BoxTime, PulseTrain};
+
+    /// A report that is late or lost says nothing about the line of the camera that read its mark.
+    #[test]
+    fn a_mark_that_was_read_and_not_reported_is_no_lost_pulse() {
+        let edges = |n| -> Vec<TriggerEdge> {
+            let train = PulseTrain::new(mark(n)).unwrap();
+            let edge = |(offset, rising): (u64, bool)| TriggerEdge {
+                t_us: 1_000_000 * u64::from(n) + offset,
+                channel: 0,
+                rising,
+            };
+            train.edges().map(edge).collect()
+        };
+        let reports = [BoxReport::Mark {
+            mark: mark(0),
+            at: BoxTime { us: 0 },
+        }];
+        let sent = [mark(0), mark(1)];
+        assert!(!has_unreported(&reports, &sent, &[edges(0), edges(0)]));
+        let both = [edges(0), edges(1)].concat();
+        assert!(has_unreported(&reports, &sent, &[edges(0), both.clone()]));
+        // A mark that no one asked for is not missing.
+        assert!(!has_unreported(&reports, &sent[..1], &[both, Vec::new()]));
+    }
 
     #[test]
     fn trains_between_the_first_and_the_last_mark_count_and_a_missing_one_is_detected() {

@@ -185,6 +185,24 @@ impl<'a> Streams<'a> {
         false
     }
 
+    /// Polls the devices until the box has reported `marks`, for as long as it may need.
+    pub(crate) fn wait_for_reports(&mut self, marks: &[Mark], on_chunk: &mut dyn FnMut(&RawChunk)) {
+        let until = self.now() + LINE_TIMEOUT + self.timing_slack;
+        let is_missing = |reports: &[BoxReport]| {
+            marks.iter().any(|sent| {
+                let of = |r: &BoxReport| matches!(r, BoxReport::Mark { mark, .. } if mark == sent);
+                !reports.iter().any(of)
+            })
+        };
+        while self.box_problem.is_none()
+            && self.now() < until
+            && is_missing(&self.reports)
+            && !(self.stop)()
+        {
+            self.step(until, on_chunk);
+        }
+    }
+
     /// Waits until both camera streams reach the time of this call or stall, then stops the cameras
     /// and counts their last data. Adds failures to `findings`, with `metrics` unmeasured on the
     /// failed camera.
