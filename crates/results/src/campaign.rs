@@ -9,7 +9,7 @@ use skinrig_model::{Look, PressRole, RepetitionId, RunEnd, Verdict};
 use skinrig_protocol::{Plan, Step, Stop};
 use skinrig_statistics::{Settings, StoppingRule, stop_sample};
 
-use crate::error::ResultsError;
+use crate::error::{LookFault, ResultsError};
 
 /// The part of a plan that tells whether it declares looks; plans of every version have it.
 #[derive(Deserialize)]
@@ -75,7 +75,7 @@ impl Declared {
     }
 
     /// This look at the scored presses up to its repetition.
-    pub(crate) fn look(self, analysis: &Analysis, rule: &Stop) -> Result<Look, String> {
+    pub(crate) fn look(self, analysis: &Analysis, rule: &Stop) -> Result<Look, LookFault> {
         let counts = |p: &&PressResult| {
             p.role == PressRole::Score
                 && p.verdict == Verdict::Valid
@@ -88,7 +88,7 @@ impl Declared {
                 Some((p.location.index(), libm::hypot(x, y)))
             })
             .collect();
-        let sample = stop_sample(rule.metric, errors.iter().copied()).map_err(|e| e.to_string())?;
+        let sample = stop_sample(rule.metric, errors.iter().copied())?;
         let stopping = StoppingRule {
             question: rule.question,
             looks: rule.looks,
@@ -99,9 +99,8 @@ impl Declared {
             seed: analysis.settings.seed,
             ..Settings::default()
         };
-        let found = stopping.look(&sample, self.number, &settings);
-        let found = found.map_err(|e| e.to_string())?;
-        let found = found.ok_or_else(|| "it is beyond the declared looks".to_owned())?;
+        let found = stopping.look(&sample, self.number, &settings)?;
+        let found = found.ok_or(LookFault::Beyond)?;
         Ok(Look {
             number: self.number,
             declared: rule.looks,

@@ -6,6 +6,7 @@ use skinrig_analysis::AnalysisError;
 use skinrig_online::ThresholdError;
 use skinrig_protocol::Diagnostics;
 use skinrig_recorder::RecorderError;
+use skinrig_statistics::{ComparisonError, SampleFault};
 
 use crate::earlier_mismatch::EarlierMismatch;
 
@@ -67,11 +68,37 @@ pub enum ResultsError {
         /// Number of the look.
         number: u32,
         /// Why not.
-        why: String,
+        why: LookFault,
     },
     /// The analysis rejects its input.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
+}
+
+/// Why a look has no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum LookFault {
+    /// The numbers of the session must not be used.
+    #[error("{0}")]
+    Invalid(String),
+    /// The plan declares none.
+    #[error("the plan declares no looks")]
+    NoneDeclared,
+    /// The plan has others.
+    #[error("the plan has no such look")]
+    NotInPlan,
+    /// The plan has no rule for it.
+    #[error("the plan has no rule")]
+    NoRule,
+    /// Its number is beyond those of the rule.
+    #[error("it is beyond the declared looks")]
+    Beyond,
+    /// The presses so far make no sample.
+    #[error(transparent)]
+    Sample(#[from] SampleFault),
+    /// The sample has no interval.
+    #[error(transparent)]
+    Interval(#[from] ComparisonError),
 }
 
 /// Why a session does not teach what a touch is.

@@ -25,7 +25,7 @@ mod take_look;
 mod window;
 
 pub use earlier_mismatch::EarlierMismatch;
-pub use error::{NotLearnt, ResultsError};
+pub use error::{LookFault, NotLearnt, ResultsError};
 pub use events::{Rescan, SessionEvents};
 pub use learn_skin::learn_skin;
 pub use origin::{Origin, differences_from_optical};
