@@ -6,6 +6,12 @@ import { cameraPicture } from '/app/camera.js';
 import { timeline } from '/app/timeline.js';
 const height = mm => `${number(Math.abs(mm))} mm ${mm < 0 ? 'into' : 'above'} the skin`;
 const MARK_S = 0.05;
+const REACTIONS = ['stopped', 'lifted'];
+// What the run felt at a time: the newest estimate of a touch that has not ended by then.
+export const feltAt = (touches, t) => {
+  const last = touches.findLast(row => row[0] <= t && !REACTIONS.includes(row[1]));
+  return ['onset', 'position'].includes(last?.[1]) ? { at_mm: last[2], region: last[3] } : null;
+};
 export const summary = a => !a ? 'not analysed: `skinrig analyze` measures the errors' : a.valid
   ? `${a.calibrated ? 'RMSE' : 'residual against the nominal geometry'} ${number(a.rmse_mm[0])} mm (${number(a.rmse_mm[1])} to ${number(a.rmse_mm[2])}), n = ${a.n}; clock certificate: ${a.certificate.status}`
   : `INVALID: ${a.invalid_because.join('; ')}`;
@@ -15,7 +21,7 @@ export const player = async (named, on, signal) => {
   const pictures = [1, 2].map(cameraPicture);
   const said = el('p', { class: 'soft', role: 'status' });
   const list = el('div');
-  const whole = timeline('Session: event rates, presses, clock marks', on.time), strip = timeline('Press: phases and clock marks', on.time);
+  const whole = timeline('Session: event rates, presses, clock marks, touches felt', on.time), strip = timeline('Press: phases, clock marks, touches felt', on.time);
   const phases = el('p', { class: 'soft' });
   const map = skinMap(s.outline_mm, s.cameras, on.choose);
   let all = [], chosen = null, found = null, shown = null;
@@ -35,7 +41,9 @@ export const player = async (named, on, signal) => {
     if (!press?.times_s) return;
     const [approach, contact, depth, retract, release, clear] = press.times_s;
     strip.draw(s, [press], [approach, clear], press.times_s);
-    phases.textContent = `Press ${press.press}: ${[['approach', approach], ['contact', contact], ['at depth', depth], ['retract', retract], ['release', release], ['clear', clear]]
+    const felt = s.touches.filter(row => row[0] >= approach && row[0] <= clear && ['onset', ...REACTIONS].includes(row[1]));
+    phases.textContent = `Press ${press.press}: ${[['approach', approach], ['contact', contact], ['at depth', depth], ['retract', retract], ['release', release], ['clear', clear],
+      ...felt.map(row => [row[1] === 'onset' ? 'felt' : `${row[1]} because it was felt`, row[0]])]
       .map(([word, t]) => `${word} ${number(t - contact)} s`).join(', ')}; ${s.marks.filter(m => m[2] === press.press).length} clock marks`;
     if (!s.analysis) return;
     try {
@@ -52,10 +60,12 @@ export const player = async (named, on, signal) => {
       const inPress = chosen?.times_s && t >= chosen.times_s[0] && t <= chosen.times_s[5];
       const counts = [one, two].map((f, k) => pictures[k].events(f, inPress ? chosen.views?.[k] : null, inPress && on.clusters() ? found?.[k] : null));
       const tip = poses.at(-1);
-      map.mark(chosen, tip?.slice(1, 4));
+      const touch = feltAt(s.touches, t);
+      map.mark(chosen, tip?.slice(1, 4), touch?.at_mm && touch);
       [whole, strip].forEach(line => line.at(t));
       const mark = s.marks.findLast(m => m[0] <= t && m[0] > t - Math.max(MARK_S, accumulation_s));
       said.textContent = `${number(t, 3)} s: ${counts[0]} and ${counts[1]} events; tip ${tip ? height(tip[3]) : 'unknown'}`
+        + (touch ? '; a touch is felt' : '')
         + (mark ? `; clock mark: ${mark[1].replaceAll('_', ' ')}, press ${mark[2]}` : '')
         + (s.clocks_measured.every(Boolean) ? '' : '; camera times from arrivals, good to milliseconds');
       shown = { t_s: t, press: inPress ? chosen.press : null, events: counts, tip_mm: tip?.slice(1, 4) ?? null };

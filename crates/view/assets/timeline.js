@@ -1,4 +1,4 @@
-// A strip of session time: event rates, presses, clock marks, notes, and the time that is shown. A click goes to a time.
+// A strip of session time: event rates, presses, clock marks, touches felt, notes, and the time that is shown. A click goes to a time.
 import { shape } from '/app/dom.js';
 const WIDTH = 1000, HEIGHT = 64;
 const path = (ticks, x, y0, y1) => ticks.filter(t => x(t) >= 0 && x(t) <= WIDTH).map(t => `M${x(t).toFixed(1)} ${y0}V${y1}`).join('');
@@ -29,6 +29,7 @@ export const timeline = (label, go) => {
         ...phases ? [line('phase', path(phases, x, 4, HEIGHT))] : s.rates.map((rates, k) => line(`line c${k + 1}`, curve(rates, x, s, most))),
         ...presses(rows),
         line('clock', path(s.marks.map(m => m[0]), x, 0, 12)),
+        line('felt', path(s.touches.filter(row => row[1] === 'onset').map(row => row[0]), x, HEIGHT - 18, HEIGHT)),
         line('said', path([...s.notes, ...s.interruptions].map(n => n[0]), x, 0, HEIGHT)));
     },
     at: t => cursor.setAttribute('d', t >= from && t <= to ? `M${x(t).toFixed(1)} 0V${HEIGHT}` : ''),

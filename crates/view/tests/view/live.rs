@@ -15,7 +15,7 @@ use skinrig_analysis::Analysis;
 use skinrig_formats::evt2;
 use skinrig_model::{
     AttemptId, CameraId, CdEvent, ChunkFacts, HostTime, Polarity, PressId, RawChunk, Record,
-    RunHeader,
+    RunHeader, TouchEstimate, TouchKind,
 };
 use skinrig_recorder::{SessionReader, SessionWriter};
 use skinrig_view::{
@@ -213,6 +213,61 @@ fn one_follower_asks_the_run_for_all_pages() {
     }
     assert_eq!(callers.lock().unwrap().len(), 1);
     drop(writer);
+}
+
+/// What the server answers to a request for `what` of a session.
+fn answer((to, token): &Access, what: &str, name: &str) -> Value {
+    let mut page = TcpStream::connect(to).unwrap();
+    let request = format!(
+        "GET /api/{what}?session={name} HTTP/1.1\r\nHost: {to}\r\nAuthorization: Bearer {token}\r\nConnection: close\r\n\r\n"
+    );
+    page.write_all(request.as_bytes()).unwrap();
+    let mut text = String::new();
+    page.read_to_string(&mut text).unwrap();
+    let (_, body) = text.split_once("\r\n\r\n").unwrap();
+    serde_json::from_str(body).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+#[test]
+fn a_page_gets_the_touches_that_were_felt() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = header(folder.path());
+    let name = "felt.session.sqlite";
+    let mut writer = recording(folder.path(), name, &header);
+    for (ms, kind, at_mm) in [
+        (1_500, TouchKind::Onset, Some([4.0, 5.0])),
+        (1_750, TouchKind::Release, None),
+    ] {
+        let t = HostTime(ms * 1_000_000);
+        let touch = TouchEstimate {
+            t,
+            until: t,
+            until_sd_ns: 0,
+            kind,
+            attempt: None,
+            at_mm,
+            region: None,
+            llr: None,
+        };
+        writer.accept(Record::Touch(touch)).unwrap();
+    }
+    // Durable, because the writer waits before an attempt begins.
+    let attempt = AttemptId {
+        press: PressId::from_index(0),
+        number: 1,
+    };
+    let t = HostTime(2_000_000_000);
+    writer.accept(Record::Intent { attempt, t }).unwrap();
+    let (access, _) = serve(folder.path(), Vec::new());
+    let found = answer(&access, "session", name);
+    assert_eq!(
+        found["touches"],
+        json!([
+            [1.5, "onset", [4.0, 5.0], null],
+            [1.75, "release", null, null]
+        ]),
+        "{found}"
+    );
 }
 
 /// Records `CHUNKS` chunks of 1 MiB; how long it takes until they are durable, s.

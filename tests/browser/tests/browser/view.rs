@@ -156,6 +156,30 @@ fn a_session_is_played_back_with_clusters_marks_and_rays() {
     );
 }
 
+/// An onset is a tick of the strip; the touch is shown until it ends, and a reaction ends none.
+#[test]
+fn touches_that_were_felt_are_drawn_until_they_end() {
+    with_view(
+        |shelf| format!("&session={}", shelf.sessions[0]),
+        |page| {
+            page.wait_for(SEEN).unwrap();
+            page.evaluate(
+                "(() => { const at = [4, 5], touches = [[2, 'onset', at, null], [2.1, 'position', at, null], [2.2, 'lifted', null, null], [3, 'release', null, null], [20, 'onset', at, null]]; \
+                 Promise.all([import('/app/timeline.js'), import('/app/player.js')]).then(([{ timeline }, { feltAt }]) => { \
+                 const strip = timeline('strip', () => {}); \
+                 strip.draw({ span_s: [0, 30], rates: [[1], [1]], marks: [], notes: [], interruptions: [], touches }, [], [0, 10]); \
+                 window.ticks = strip.svg.querySelector('.felt').getAttribute('d').split('M').length - 1; \
+                 window.felt = [1, 2, 2.5, 3.5].map(t => feltAt(touches, t)?.at_mm ?? null); }); })()",
+            )
+            .unwrap();
+            page.wait_for("window.felt !== undefined").unwrap();
+            assert_eq!(page.evaluate("window.ticks").unwrap(), json!(1));
+            let felt = page.evaluate("window.felt").unwrap();
+            assert_eq!(felt, json!([null, [4, 5], [4, 5], null]));
+        },
+    );
+}
+
 #[test]
 fn what_is_shown_is_saved() {
     with_view(
