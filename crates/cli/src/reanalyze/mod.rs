@@ -1,6 +1,7 @@
 //! `skinrig reanalyze`: analyses many sessions with other settings, each result a variant of its session.
 
 pub(crate) mod args;
+mod cluster;
 mod local;
 mod request;
 mod table;
@@ -12,7 +13,7 @@ use rayon::prelude::*;
 use skinrig_analysis::ANALYSIS_VERSION;
 use skinrig_protocol::NewSettings;
 
-use self::args::ReanalyzeArgs;
+use self::args::{Engine, ReanalyzeArgs};
 use self::request::{Answered, Refusal, Request};
 use self::table::{Row, State};
 use crate::analyses;
@@ -26,9 +27,14 @@ pub(crate) use self::local::analyze_request;
 /// `skinrig reanalyze`.
 ///
 /// # Errors
-/// Before any analysis: [`Failure::input`] for invalid settings or arguments. After all sessions: [`Failure::internal`] if one was lost
+/// Before any analysis: [`Failure::input`] for invalid settings or arguments, [`Failure::internal`] without the cluster. After all sessions: [`Failure::internal`] if one was lost
 /// to a fault of a machine, else [`Failure::input`] if one could not be analysed, else [`Failure::limit`] if one is INVALID.
 pub(crate) fn reanalyze(args: &ReanalyzeArgs, output: Output) -> Outcome {
+    if args.jobs.is_some() && args.on != Engine::Local {
+        return Err(Failure::input(
+            "--jobs: expected no number of processes with --on dask://, found one\n  next: leave it out; the workers of the cluster decide",
+        ));
+    }
     let settings = settings(&args.settings)?;
     let requests = requests(args, &settings)?;
     let mut rows = before(&requests);
@@ -47,7 +53,11 @@ pub(crate) fn reanalyze(args: &ReanalyzeArgs, output: Output) -> Outcome {
             phase.above(|| errln!("{failure}"));
         }
     };
-    local::run(&to_do, args.jobs, &mut each);
+    match &args.on {
+        _ if to_do.is_empty() => {}
+        Engine::Local => local::run(&to_do, args.jobs, &mut each),
+        Engine::Dask(scheduler) => cluster::run(&to_do, scheduler, &phase, &mut each)?,
+    }
     drop(phase);
     register(&requests);
     table::print(args, &settings.overrides, &rows, output);

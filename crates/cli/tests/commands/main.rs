@@ -12,6 +12,8 @@ mod compare;
 #[path = "../../../../tests/crash/mod.rs"]
 mod crash;
 mod damage;
+#[cfg(unix)]
+mod dask;
 mod dataset;
 mod displaced;
 #[cfg(target_os = "linux")]
