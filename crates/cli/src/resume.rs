@@ -263,7 +263,7 @@ fn run_leg(
     let sink = SessionSink::new(writer, view, ReplayExpectations::default());
     let mut sink = sink
         .on_disk_of(folder)
-        .controlled(&args.session, operator.control())
+        .controlled(&args.session, operator.control(), false)
         .with_notes(notes)
         .with_faults(FaultInjector::new(&args.faults))
         .notifying(notifier.map(|notifier| RunMessages::new(notifier, &found.header)));

@@ -98,7 +98,9 @@ pub(crate) fn record(
         .notifying(notifier.map(|notifier| RunMessages::new(notifier, &header)));
     let control = operator.control();
     if preflight.is_some() {
-        sink = sink.on_disk_of(folder).controlled(&path, control);
+        sink = sink
+            .on_disk_of(folder)
+            .controlled(&path, control, plan.online.is_some());
     }
     if let Some((at, kind)) = intent.known.interruption {
         rig.clock = Box::new(RepeatedOperator {

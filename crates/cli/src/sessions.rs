@@ -267,3 +267,25 @@ fn line(table: &Table, session: &SessionSummary) -> String {
         }
     }
 }
+
+/// The session at `place` as [`find`] takes it; `None` as long as there is none.
+///
+/// # Errors
+/// [`Failure::input`] for a folder that cannot be read.
+pub(crate) fn find_if_any(place: &Path) -> Result<Option<PathBuf>, Failure> {
+    let mut folder = match place.is_dir() {
+        true => std::fs::read_dir(place).map_err(Failure::input)?,
+        false => return Ok(place.exists().then(|| place.to_owned())),
+    };
+    let is_session = |entry: std::io::Result<std::fs::DirEntry>| {
+        entry.is_ok_and(|e| {
+            let name = e.file_name();
+            name.to_string_lossy().ends_with(SESSION_SUFFIX)
+        })
+    };
+    if folder.any(is_session) {
+        find(place).map(Some)
+    } else {
+        Ok(None)
+    }
+}

@@ -101,10 +101,16 @@ impl SessionSink {
         self
     }
 
-    /// Accepts requests from other terminals for `session`. If that fails, the run continues with a warning.
+    /// Accepts requests from other terminals for `session`, of a run that `feels` touches or not. If that fails, the run continues
+    /// with a warning.
     #[must_use]
-    pub(crate) fn controlled(mut self, session: &Path, control: &ControlHandle) -> Self {
-        match Remote::open(session, control) {
+    pub(crate) fn controlled(
+        mut self,
+        session: &Path,
+        control: &ControlHandle,
+        feels: bool,
+    ) -> Self {
+        match Remote::open(session, control, feels) {
             Ok(remote) => self.remote = Some(remote),
             Err(why) => self.view.print(&format!(
                 "warning: this run cannot be controlled from other terminals ({why}); ctrl-C works"
@@ -228,8 +234,13 @@ impl RecordSink for SessionSink {
             Some(record.clone())
         };
         self.writer.accept(record).map_err(|e| fault_of(&e))?;
-        if let Some(record) = shown {
-            self.view.update(&record);
+        if let Some(record) = &shown {
+            self.view.update(record);
+        }
+        match (&self.remote, shown) {
+            (Some(remote), Some(Record::Touch(touch))) => remote.show_touch(&touch),
+            (Some(remote), Some(Record::Ended { .. })) => remote.end_touches(),
+            _ => {}
         }
         if let Some(remote) = &mut self.remote {
             remote.show(self.view.progress(), is_bulk);

@@ -228,6 +228,10 @@ pub(crate) struct WatchArgs {
     #[arg(long)]
     pub once: bool,
 
+    /// Print every touch that the run feels from now on as a line of JSON, as soon as it is felt, until the run ends.
+    #[arg(long, conflicts_with = "once")]
+    pub touches: bool,
+
     /// How often to refresh.
     #[arg(long, value_name = "TIME", default_value = "1 s", value_parser = time_s)]
     pub every: f64,

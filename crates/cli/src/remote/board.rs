@@ -5,11 +5,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use skinrig_controller::{ControlHandle, Progress, State};
-use skinrig_model::{CameraId, RawChunk};
+use skinrig_model::{CameraId, RawChunk, TouchEstimate};
 
+use super::answer::Answer;
 use super::error::ServerError;
 use super::newest::NewestBytes;
 use super::server::Server;
+use super::touches::{MOST_FOLLOWERS, TouchFeed};
 use super::wire::{Reply, Request, RunRequest, RunSnapshot};
 
 /// Shortest interval between updates caused by bulk data.
@@ -22,23 +24,36 @@ pub(crate) struct Board {
     control: ControlHandle,
     began: Instant,
     newest: Arc<NewestBytes>,
+    feels: bool,
+    touches: Arc<TouchFeed>,
 }
 
 impl Board {
-    /// A board for a run without progress.
+    /// A board for a run without progress, which `feels` touches or not.
     #[must_use]
-    pub(crate) fn new(control: ControlHandle) -> Self {
+    pub(crate) fn new(control: ControlHandle, feels: bool) -> Self {
         Self {
             progress: Arc::default(),
             control,
             began: Instant::now(),
             newest: Arc::new(NewestBytes::new()),
+            feels,
+            touches: Arc::new(TouchFeed::new(feels)),
         }
     }
 
     /// Answers one request; never waits.
     #[must_use]
-    pub(crate) fn answer(&self, request: Request) -> Reply {
+    pub(crate) fn answer(&self, request: Request) -> Answer {
+        if let Request::Touches = request
+            && let Some(touches) = self.touches.follow()
+        {
+            return Answer::Touches(touches);
+        }
+        Answer::Once(self.reply(request))
+    }
+
+    fn reply(&self, request: Request) -> Reply {
         match request {
             Request::Status => Reply::Live(Box::new(self.live())),
             Request::Newest => Reply::Newest(self.newest.ask().map(Into::into)),
@@ -46,6 +61,13 @@ impl Board {
             _ if self.control.state() == State::Finished => {
                 Reply::Refused("expected a run under way, found one that has ended".to_owned())
             }
+            Request::Touches if !self.feels => Reply::Refused(
+                "expected a run that feels touches (`online` in its protocol), found one that does not"
+                    .to_owned(),
+            ),
+            Request::Touches => Reply::Refused(format!(
+                "expected at most {MOST_FOLLOWERS} programs that follow touches, found as many already"
+            )),
             Request::Control(what) => {
                 match what {
                     RunRequest::Pause => self.control.pause(),
@@ -85,22 +107,29 @@ pub(crate) struct Remote {
     progress: Arc<Mutex<Progress>>,
     updated: Option<Instant>,
     newest: Arc<NewestBytes>,
+    touches: Arc<TouchFeed>,
     _server: Server,
 }
 
 impl Remote {
-    /// Listens for requests to `session`, which this process writes.
+    /// Listens for requests to `session`, which this process writes, of a run that `feels` touches or not.
     ///
     /// # Errors
     /// [`ServerError`] when that is not possible; the run continues without it.
-    pub(crate) fn open(session: &Path, control: &ControlHandle) -> Result<Self, ServerError> {
-        let board = Board::new(control.clone());
+    pub(crate) fn open(
+        session: &Path,
+        control: &ControlHandle,
+        feels: bool,
+    ) -> Result<Self, ServerError> {
+        let board = Board::new(control.clone(), feels);
         let (progress, newest) = (Arc::clone(&board.progress), Arc::clone(&board.newest));
+        let touches = Arc::clone(&board.touches);
         let server = Server::open(session, move |request| board.answer(request))?;
         Ok(Self {
             progress,
             updated: None,
             newest,
+            touches,
             _server: server,
         })
     }
@@ -114,6 +143,16 @@ impl Remote {
             shown.clone_from(progress);
             self.updated = Some(Instant::now());
         }
+    }
+
+    /// Hands a touch to the programs that follow.
+    pub(crate) fn show_touch(&self, touch: &TouchEstimate) {
+        self.touches.send(touch);
+    }
+
+    /// No more touches will be felt.
+    pub(crate) fn end_touches(&self) {
+        self.touches.end();
     }
 
     /// Most bytes per camera to copy at the next tick; `None` unless another terminal looks at the newest events.
@@ -139,25 +178,29 @@ mod tests {
     #[test]
     fn requests_reach_the_controller_and_return_their_number() {
         let control = ControlHandle::new();
-        let board = Board::new(control.clone());
+        let board = Board::new(control.clone(), false);
+        assert!(matches!(
+            board.answer(Request::Touches),
+            Answer::Once(Reply::Refused(why)) if why.contains("`online`")
+        ));
         assert_eq!(
-            board.answer(Request::Control(RunRequest::Pause)),
+            board.reply(Request::Control(RunRequest::Pause)),
             Reply::Handed(1)
         );
         assert_eq!(
-            board.answer(Request::Control(RunRequest::Halt)),
+            board.reply(Request::Control(RunRequest::Halt)),
             Reply::Handed(2)
         );
         let note = Request::Note {
             by: "Ann".into(),
             text: "warm".into(),
         };
-        assert_eq!(board.answer(note.clone()), Reply::Handed(1));
+        assert_eq!(board.reply(note.clone()), Reply::Handed(1));
         for n in 2..=16 {
-            assert_eq!(board.answer(note.clone()), Reply::Handed(n));
+            assert_eq!(board.reply(note.clone()), Reply::Handed(n));
         }
-        assert!(matches!(board.answer(note), Reply::Refused(_)));
-        let Reply::Live(live) = board.answer(Request::Status) else {
+        assert!(matches!(board.reply(note), Reply::Refused(_)));
+        let Reply::Live(live) = board.reply(Request::Status) else {
             panic!("expected the run");
         };
         assert_eq!((live.asked, live.heard, live.noted), (2, 0, 0));

@@ -1,9 +1,10 @@
 //! Control of a run from another terminal, over a Unix socket beside the session.
 //!
-//! A request and its reply are one line of JSON each. Only the user of the run and root may connect; there is no network port. The
-//! controller never waits for a terminal: requests are bits of its [`ControlHandle`](skinrig_controller::ControlHandle), notes go
+//! A request and its reply are one line of JSON each; touches are a line each until the run ends. Only the user of the run and root
+//! may connect; there is no network port. The controller never waits for a terminal: requests are bits of its [`ControlHandle`](skinrig_controller::ControlHandle), notes go
 //! through a short queue, and the progress is a copy that it updates while no terminal reads it.
 
+mod answer;
 mod board;
 mod client;
 mod error;
@@ -12,10 +13,11 @@ mod newest;
 mod place;
 #[cfg(unix)]
 mod server;
+mod touches;
 mod wire;
 
 pub(crate) use board::Remote;
-pub(crate) use client::ask;
+pub(crate) use client::{ask, follow};
 pub(crate) use error::RemoteError;
 pub(crate) use wire::{
     LiveTouch, MOST_NAME_CHARS, NewestEvents, Reply, Request, RunRequest, RunSnapshot,
@@ -26,7 +28,9 @@ pub(crate) use wire::{
 mod server {
     use std::path::Path;
 
-    use super::{Reply, Request, ServerError};
+    use super::ServerError;
+    use super::answer::Answer;
+    use super::wire::Request;
 
     /// Never opened.
     pub(crate) struct Server;
@@ -36,7 +40,7 @@ mod server {
         /// Always.
         pub fn open(
             _session: &Path,
-            _answer: impl FnMut(Request) -> Reply + Send + 'static,
+            _answer: impl FnMut(Request) -> Answer + Send + 'static,
         ) -> Result<Self, ServerError> {
             Err(ServerError::Unsupported)
         }

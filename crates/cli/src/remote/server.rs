@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::answer::Answer;
 use super::error::ServerError;
 use super::place;
 use super::wire::{MOST_REQUEST_BYTES, Reply, Request, RequestError};
@@ -18,6 +19,8 @@ use super::wire::{MOST_REQUEST_BYTES, Reply, Request, RequestError};
 const ASK_WITHIN: Duration = Duration::from_millis(300);
 /// Callers served at once; a further one is served on the listening thread, so that the next ones wait.
 const MOST_AT_ONCE: usize = 256;
+/// Time limit for a program that follows touches to take a line once its buffer is full.
+const TAKE_WITHIN: Duration = Duration::from_secs(5);
 /// Pause after the system failed to accept a caller (no free file descriptor).
 const TRY_AGAIN: Duration = Duration::from_millis(100);
 
@@ -38,7 +41,7 @@ impl Server {
     /// [`ServerError`] when no socket can be created.
     pub(super) fn open(
         session: &Path,
-        answer: impl FnMut(Request) -> Reply + Send + 'static,
+        answer: impl FnMut(Request) -> Answer + Send + 'static,
     ) -> Result<Self, ServerError> {
         let answer = Arc::new(Mutex::new(answer));
         let [beside, own] = place::places(session)?;
@@ -102,15 +105,15 @@ impl Drop for Server {
 /// Serves a caller on its own thread, so that a slow or silent one does not delay others.
 fn spawn_serve<A>(stream: UnixStream, answer: &Arc<Mutex<A>>)
 where
-    A: FnMut(Request) -> Reply + Send + 'static,
+    A: FnMut(Request) -> Answer + Send + 'static,
 {
     if Arc::strong_count(answer) > MOST_AT_ONCE {
-        return drop(serve(stream, answer));
+        return drop(serve(stream, answer, false));
     }
     let answer = Arc::clone(answer);
     let serving = std::thread::Builder::new().name("control-caller".to_owned());
     // If the thread cannot be started, the caller gets no reply and may try again.
-    let _ = serving.spawn(move || drop(serve(stream, &answer)));
+    let _ = serving.spawn(move || drop(serve(stream, &answer, true)));
 }
 
 /// A socket at `path` that only this user can connect to.
@@ -129,21 +132,40 @@ fn identity(path: &Path) -> io::Result<(u64, u64)> {
     fs::symlink_metadata(path).map(|m| (m.dev(), m.ino()))
 }
 
-/// Reads one request and answers it.
-fn serve(mut stream: UnixStream, answer: &Mutex<impl FnMut(Request) -> Reply>) -> io::Result<()> {
+/// Reads one request and answers it. Only a caller that `may_stay` gets touches.
+fn serve(
+    mut stream: UnixStream,
+    answer: &Mutex<impl FnMut(Request) -> Answer>,
+    may_stay: bool,
+) -> io::Result<()> {
     let reply = match place::check_peer(&stream, place::may_ask) {
         Err(why) => Reply::Refused(why.to_string()),
         Ok(()) => match read_request(&mut stream)? {
             Err(why) => Reply::Refused(why.to_string()),
+            Ok(Request::Touches) if !may_stay => Reply::Refused("too many callers".to_owned()),
             Ok(request) => {
                 let mut answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
-                (*answer)(request)
+                let answered = (*answer)(request);
+                drop(answer);
+                match answered {
+                    Answer::Once(reply) => reply,
+                    Answer::Touches(touches) => {
+                        stream.set_write_timeout(Some(TAKE_WITHIN))?;
+                        return touches
+                            .iter()
+                            .try_for_each(|touch| write_line(&mut stream, &Reply::Touch(touch)));
+                    }
+                }
             }
         },
     };
-    let mut line = serde_json::to_vec(&reply)?;
-    line.push(b'\n');
     stream.set_write_timeout(Some(ASK_WITHIN))?;
+    write_line(&mut stream, &reply)
+}
+
+fn write_line(stream: &mut UnixStream, reply: &Reply) -> io::Result<()> {
+    let mut line = serde_json::to_vec(reply)?;
+    line.push(b'\n');
     stream.write_all(&line)
 }
 
@@ -196,8 +218,8 @@ mod tests {
 
     fn server(session: &Path) -> Server {
         Server::open(session, |request| match request {
-            Request::Control(RunRequest::Pause) => Reply::Handed(7),
-            other => Reply::Refused(format!("{other:?}")),
+            Request::Control(RunRequest::Pause) => Answer::Once(Reply::Handed(7)),
+            other => Answer::Once(Reply::Refused(format!("{other:?}"))),
         })
         .unwrap()
     }

@@ -8,6 +8,7 @@ use skinrig_controller::{Progress, State, TouchProgress};
 use skinrig_model::{CameraId, TouchKind, TouchRegion};
 
 use super::newest::CameraTail;
+use super::touches::TouchLine;
 
 /// Longest request, bytes.
 pub(crate) const MOST_REQUEST_BYTES: usize = 16 * 1024;
@@ -44,6 +45,8 @@ pub(crate) enum Request {
     Status,
     /// Ask for the newest bytes of both cameras.
     Newest,
+    /// Ask for every touch that is felt from now on, a [`Reply::Touch`] each, until the run ends.
+    Touches,
     /// Control the run.
     Control(RunRequest),
     /// Add a note.
@@ -63,6 +66,8 @@ pub(crate) enum Reply {
     Live(Box<RunSnapshot>),
     /// The newest bytes of camera 1 and camera 2.
     Newest([NewestEvents; 2]),
+    /// A touch.
+    Touch(TouchLine),
     /// Accepted; the number of the request or note.
     Handed(u64),
     /// Refused, with the reason.
@@ -323,6 +328,7 @@ mod tests {
         for request in [
             Request::Status,
             Request::Newest,
+            Request::Touches,
             Request::Control(RunRequest::PauseNow),
             note("Ann", "the lamp flickers: \"40 %\""),
         ] {

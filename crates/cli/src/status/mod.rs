@@ -25,7 +25,8 @@ pub(crate) fn status(args: &StatusArgs, as_json: bool) -> Outcome {
         Ok(Reply::Live(live)) => (Some(live), None),
         Ok(Reply::Refused(why)) => (None, Some(why)),
         Err(RemoteError::Failed(why)) => (None, Some(why.to_string())),
-        Ok(Reply::Handed(_) | Reply::Newest(_)) | Err(RemoteError::NotListening) => (None, None),
+        Ok(Reply::Handed(_) | Reply::Newest(_) | Reply::Touch(_))
+        | Err(RemoteError::NotListening) => (None, None),
     };
     let stored = match stored(&session) {
         Ok(stored) => Some(stored),

@@ -8,9 +8,9 @@ mod failures;
 mod frame;
 mod map;
 mod signal;
+mod touches;
 
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use console::Term;
@@ -30,12 +30,15 @@ use frame::{Follower, Frame};
 pub(crate) fn watch(args: &WatchArgs, json: bool) -> Outcome {
     let every = Duration::try_from_secs_f64(args.every)
         .map_err(|e| Failure::input(format!("--every: {e}")))?;
+    if args.touches {
+        return touches::follow(&args.session, every);
+    }
     let mut is_announced = false;
     let mut follower = None;
     loop {
         let frame = match follower.as_mut() {
             Some(follower) => read_frame(follower, args.once)?,
-            None => match find_session(&args.session)? {
+            None => match sessions::find_if_any(&args.session)? {
                 Some(session) => read_frame(follower.insert(Follower::new(session)), args.once)?,
                 None => None,
             },
@@ -63,26 +66,6 @@ pub(crate) fn watch(args: &WatchArgs, json: bool) -> Outcome {
             None => {}
         }
         std::thread::sleep(every);
-    }
-}
-
-/// The session to watch, once there is one.
-fn find_session(place: &Path) -> Result<Option<PathBuf>, Failure> {
-    let mut folder = match place.is_dir() {
-        true => std::fs::read_dir(place).map_err(Failure::input)?,
-        false => return Ok(place.exists().then(|| place.to_owned())),
-    };
-    let is_session = |entry: std::io::Result<std::fs::DirEntry>| {
-        entry.is_ok_and(|e| {
-            let name = e.file_name();
-            name.to_string_lossy()
-                .ends_with(skinrig_recorder::SESSION_SUFFIX)
-        })
-    };
-    if folder.any(is_session) {
-        sessions::find(place).map(Some)
-    } else {
-        Ok(None)
     }
 }
 

@@ -1,10 +1,12 @@
 //! `skinrig online`, and touch felt while recording: what a replay prints, how presses react, sessions without enough to learn from.
 
+use std::process::Stdio;
+
 use serde_json::{Value, json};
 use skinrig_model::{TouchEstimate, TouchKind};
 use skinrig_recorder::SessionReader;
 
-use crate::support::{Lab, SMALL, only, skinrig, text};
+use crate::support::{Lab, SMALL, only, program, skinrig, text};
 
 /// Three repetitions calibrate, one scores.
 fn session(lab: &Lab) -> String {
@@ -132,6 +134,52 @@ fn presses_stop_when_they_are_felt_while_recording() {
             .collect()
     };
     assert!(estimates(&again.touches().unwrap()) == estimates(&touches));
+}
+
+/// Another program gets what the session records.
+#[test]
+#[cfg(unix)]
+fn another_program_follows_what_is_felt() {
+    let lab = Lab::new();
+    // It connects while the run learns, at the latest.
+    let place = lab.text("s");
+    let follower = program(&["watch", &place, "--touches", "--every", "5 ms"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let session = session_with(&lab, &["--set", "online.react.then=lift"]);
+    let output = follower.wait_with_output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let waited = String::from_utf8(output.stderr).unwrap();
+    assert!(waited.contains("no run yet"), "{waited}");
+    let facts = |t_s: f64, rest: Value| (format!("{t_s:.6}"), rest.to_string());
+    let followed: Vec<_> = String::from_utf8(output.stdout)
+        .unwrap()
+        .lines()
+        .map(|line| {
+            let line: Value = serde_json::from_str(line).unwrap();
+            assert_eq!(line["missed"], 0, "{line}");
+            let rest = json!([line["kind"], line["press"], line["region"].is_null()]);
+            facts(line["t_s"].as_f64().unwrap(), rest)
+        })
+        .collect();
+    let touches = SessionReader::open(&session).unwrap().touches().unwrap();
+    let recorded: Vec<_> = touches
+        .iter()
+        .map(|touch| {
+            let press = touch.attempt.map(|attempt| attempt.press.number());
+            let rest = json!([touch.kind, press, touch.region.is_none()]);
+            facts(touch.t.as_secs_f64(), rest)
+        })
+        .collect();
+    assert!(recorded.len() > 10, "{recorded:?}");
+    assert_eq!(followed, recorded);
+
+    // Nothing comes of a session that has ended, or of a run that feels nothing.
+    skinrig(&["watch", &session, "--touches", "--every", "5 ms"])
+        .code(2)
+        .expect_stderr(&["expected a run that writes this session", "skinrig show"]);
 }
 
 /// The leg that resumes a session does not feel: its presses are not missed.

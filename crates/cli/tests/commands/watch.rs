@@ -176,6 +176,9 @@ fn watch_waits_for_a_run_and_reports_an_interrupted_one() {
         .code(2)
         .expect_stderr(&[&folder, "found none yet", "--once"]);
     let run = LiveRun::new(&lab.path("s"));
+    skinrig(&["watch", &folder, "--touches"])
+        .code(2)
+        .expect_stderr(&["`online`", "skinrig show"]);
     run.signal("KILL");
     run.end();
     let session = text(&only(&lab.path("s"), ".session.sqlite"));

@@ -1,0 +1,15 @@
+//! What a caller gets for a request.
+
+use std::sync::mpsc::Receiver;
+
+use super::touches::TouchLine;
+use super::wire::Reply;
+
+/// What a caller gets.
+#[derive(Debug)]
+pub(crate) enum Answer {
+    /// One reply.
+    Once(Reply),
+    /// A reply per touch, until the run ends.
+    Touches(Receiver<TouchLine>),
+}
