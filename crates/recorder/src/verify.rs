@@ -17,6 +17,7 @@ mod report;
 mod seal;
 mod sqlite;
 mod stream;
+mod truth;
 
 pub use self::report::VerifyReport;
 use self::stream::Stream;
@@ -111,6 +112,7 @@ fn check_all<S: ChunkScanner>(reader: &SessionReader) -> VerifyReport {
             let poses = check_poses(reader, report);
             report.ok_or_add(poses);
             check_journal(reader, report);
+            truth::check_truth(reader, report);
             legs::check(reader, report);
         });
         let (chain, ()) = section(|report| chain::check(reader, report));

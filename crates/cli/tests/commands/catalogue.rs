@@ -177,8 +177,8 @@ fn the_catalogue_has_the_same_answers(s: &str, prototypes: &Value) {
     assert!(words.contains("sim-00000001-c1"), "{words}");
 }
 
-/// Executes a statement on a catalogue.
-fn change(file: &std::path::Path, statement: &'static str) {
+/// Executes a statement on a database.
+pub(crate) fn change(file: &std::path::Path, statement: &'static str) {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()
         .unwrap();

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::catalogue::change;
 use crate::support::{Lab, SeededRandom, text};
 use crate::support::{ProgramOutput, skinrig};
 
@@ -20,6 +21,32 @@ fn sealed_session(lab: &Lab) -> (PathBuf, Vec<u8>) {
     );
     let bytes = std::fs::read(&session).unwrap();
     (session, bytes)
+}
+
+/// Poses and measured positions of a session say the same, also after its seal was taken off.
+#[test]
+#[cfg(unix)]
+fn measured_positions_that_the_poses_contradict_are_reported() {
+    use std::os::unix::fs::PermissionsExt;
+    let lab = Lab::new();
+    let (session, _) = sealed_session(&lab);
+    let writable = std::fs::Permissions::from_mode(0o644);
+    std::fs::set_permissions(&session, writable).unwrap();
+    for statement in ["DELETE FROM seal", "DELETE FROM table_digest"] {
+        change(&session, statement);
+    }
+    let path = text(&session);
+    let sound = skinrig(&["verify", &path]).code(0).out;
+    assert!(sound.contains("sound, but not sealed"), "{sound}");
+    change(
+        &session,
+        "UPDATE attempt SET measured_y_mm = measured_y_mm + 0.3 WHERE press = 3",
+    );
+    let found = skinrig(&["verify", &path]).code(4);
+    let all = format!("{}{}", found.out, found.err);
+    assert!(all.contains("of its poses"), "{all}");
+    // No seal makes it sound again.
+    assert_ne!(skinrig(&["resume", &path]).code, Some(0));
 }
 
 /// Runs every reading command on `file`: each must exit with an expected code, without a panic.

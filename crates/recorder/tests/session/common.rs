@@ -382,7 +382,7 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
                 .map(|ms| PoseSample {
                     t: t + HostDuration::from_millis(ms),
                     commanded: target,
-                    measured: Point3::new(0.1, 1.0 / 3.0, 5.0),
+                    measured: Point3::new(1.0 / 3.0, -4.0, 5.0),
                     force_n: f64::NAN,
                 })
                 .collect(),
