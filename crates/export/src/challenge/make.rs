@@ -19,7 +19,8 @@ use crate::presses::recorded_us;
 use crate::source::{Source, TableName};
 use crate::table::{Column, Kind, Layout, Table, TableWriter, Values};
 
-/// Events from this long before the contact to this long after the release, µs.
+/// Events from this long before the contact to this long after the release, µs; at most half the pause to the press before or after:
+/// events that two presses share would tell their order, and with it their places.
 const MARGIN_US: f64 = 500_000.0;
 
 /// Description of a challenge, for people and programs.
@@ -40,7 +41,7 @@ pub(super) struct Description {
 }
 
 const TASK: &str = "Locate the presses with role `score`, in mm in the skin frame, from the events of both cameras. Events are \
-    those from 0.5 s before the contact to 0.5 s after the release; t_us counts from the contact. Write a CSV file with the \
+    those from 0.5 s before the contact to 0.5 s after the release, or half the pause to the next press if that is shorter; t_us counts from the contact. Write a CSV file with the \
     columns press, x_mm, y_mm, one row for each of these presses, cells empty if not located; optionally the 95 % region as \
     region_major_mm, region_minor_mm (semi-axes) and region_angle_deg (of the longer one, counter-clockwise from x).";
 
@@ -91,6 +92,8 @@ pub struct ChallengeFiles {
 pub(super) struct Press<'a> {
     pub row: &'a PressResult,
     timing: PressTiming,
+    /// Before the contact and after the release, µs.
+    margins_us: [f64; 2],
     pub truth: Point2,
 }
 
@@ -114,8 +117,9 @@ impl Press<'_> {
         };
         let us = |t| recorded_us(source, clock, camera.index(), t);
         let contact = us(self.timing.contact);
-        let from = (contact - MARGIN_US).max(0.0) as u64;
-        let to = (us(self.timing.release) + MARGIN_US).max(0.0) as u64;
+        let [before_us, after_us] = self.margins_us;
+        let from = (contact - before_us).ceil().max(0.0) as u64;
+        let to = (us(self.timing.release) + after_us).max(1.0) as u64 - 1;
         Ok((contact, events(camera, (from, to))?))
     }
 }
@@ -256,10 +260,13 @@ fn shuffled(rows: &[PressResult], salt: [u8; 32]) -> Vec<Press<'_>> {
             row.verdict == Verdict::Valid || row.rule().is_some_and(|r| r.is_on_data())
         }
     };
+    let all: Vec<PressTiming> = rows.iter().filter_map(|row| row.timing).collect();
     let presses = rows.iter().filter(|row| usable(row)).filter_map(|row| {
+        let timing = row.timing?;
         Some(Press {
             row,
-            timing: row.timing?,
+            timing,
+            margins_us: margins_us(&timing, &all),
             truth: row.truth?,
         })
     });
@@ -271,6 +278,22 @@ fn shuffled(rows: &[PressResult], salt: [u8; 32]) -> Vec<Press<'_>> {
             .finalize()
     });
     presses
+}
+
+/// Margins of a press among `all`: no event is in the margins of two.
+fn margins_us(own: &PressTiming, all: &[PressTiming]) -> [f64; 2] {
+    let ends = all.iter().map(|t| t.release);
+    let before = ends.filter(|t| *t <= own.contact).max();
+    let begins = all.iter().map(|t| t.contact);
+    let after = begins.filter(|t| *t >= own.release).min();
+    let pauses = [
+        before.map(|t| own.contact - t),
+        after.map(|t| t - own.release),
+    ];
+    pauses.map(|pause| {
+        let half_us = pause.map(|pause| 0.5e-3 * pause.0 as f64);
+        half_us.map_or(MARGIN_US, |us| us.min(MARGIN_US))
+    })
 }
 
 fn press_table(presses: &[Press<'_>]) -> Table {
@@ -363,4 +386,38 @@ fn write(folder: &Folder, suffix: &str, text: &str) -> Result<PathBuf, ExportErr
     folder.write_atomic(suffix, |to| {
         std::fs::write(to, text).map_err(ExportError::file(to))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_model::HostTime;
+
+    use super::*;
+
+    fn press(contact_ms: i64, release_ms: i64) -> PressTiming {
+        let at = |ms: i64| HostTime(ms * 1_000_000);
+        PressTiming {
+            approach: at(contact_ms - 100),
+            contact: at(contact_ms),
+            at_depth: at(contact_ms + 10),
+            retract: at(release_ms - 10),
+            release: at(release_ms),
+            clear: at(release_ms + 100),
+        }
+    }
+
+    /// Presses that share events could be put into their order.
+    #[test]
+    fn no_event_is_in_two_presses() {
+        let all = [press(0, 200), press(500, 700), press(5_000, 5_200)];
+        let margins = all.map(|own| margins_us(&own, &all));
+        assert_eq!(
+            margins,
+            [
+                [MARGIN_US, 150_000.0],
+                [150_000.0, MARGIN_US],
+                [MARGIN_US, MARGIN_US]
+            ]
+        );
+    }
 }
