@@ -2,7 +2,7 @@
 
 use crate::cause::Cause;
 use crate::evidence::Evidence;
-use crate::night::{Attempt, Part};
+use crate::night::{Attempt, CheckResult, Part};
 use crate::rules::{Case, RuleResult, apply_rules};
 use crate::verdict::Verdict;
 
@@ -42,6 +42,21 @@ pub fn judge_attempt(
 /// other faults stay visible.
 fn severity(ruling: &RuleResult) -> (Verdict, bool) {
     (ruling.verdict, ruling.cause != Some(Cause::Infrastructure))
+}
+
+/// Verdict of each part of an attempt at `check`, after the rules: INVALID for a device at fault, and for all parts if other checks
+/// made the check INVALID.
+#[must_use]
+pub fn part_verdicts(check: &CheckResult, attempt: &Attempt) -> Vec<Verdict> {
+    let by_others = check.verdict == Verdict::Invalid && attempt.verdict != Verdict::Invalid;
+    let parts = attempt.parts.iter();
+    let judged = parts.map(|part| {
+        // The cause plays no part in it.
+        let ruling = judge_part(part, &attempt.parts, &attempt.evidence, Cause::Rig);
+        let own = part.verdict.max(ruling.verdict);
+        if by_others { Verdict::Invalid } else { own }
+    });
+    judged.collect()
 }
 
 fn judge_part(

@@ -12,6 +12,7 @@ pub use self::suite_nights::SuiteNights;
 use std::path::{Path, PathBuf};
 
 use skinrig_nightly::Night;
+use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::trend::derived::RATIOS;
 use skinrig_nightly::trend::{Acceptance, History, NightSummary};
 use tokio::runtime::Runtime;
@@ -170,10 +171,15 @@ pub fn read_night(path: &Path) -> Result<Night, HistoryError> {
         doing: "reading it",
         source,
     })?;
-    serde_json::from_slice(&text).map_err(|e| HistoryError::InvalidNight {
+    let invalid = |found: String| HistoryError::InvalidNight {
         path: path.to_owned(),
-        found: e.to_string(),
-    })
+        found,
+    };
+    let night: Night = serde_json::from_slice(&text).map_err(|e| invalid(e.to_string()))?;
+    if night.version != NIGHT_VERSION {
+        return Err(invalid(format!("version {}", night.version)));
+    }
+    Ok(night)
 }
 
 /// The folder of a night as stored in the history: relative if it is inside the history's folder, so that both can be moved.

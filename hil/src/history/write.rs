@@ -1,9 +1,10 @@
 //! Writes the rows of a night in one transaction.
 
 use sha2::{Digest, Sha256};
-use skinrig_nightly::Night;
+use skinrig_nightly::judge::part_verdicts;
 use skinrig_nightly::night::{CheckResult, Measurement, Part};
 use skinrig_nightly::trend::{Acceptance, NightSummary};
+use skinrig_nightly::{Night, Verdict};
 use sqlx::{Sqlite, Transaction};
 
 use super::error::QueryError;
@@ -86,9 +87,9 @@ async fn check(tx: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<(),
         .execute(&mut **tx)
         .await?;
     for (attempt, record) in (1..).zip(&check.attempts) {
-        for part in &record.parts {
+        for (part, verdict) in record.parts.iter().zip(part_verdicts(check, record)) {
             for m in &part.measurements {
-                measurement(tx, (night, &check.name, attempt), part, m).await?;
+                measurement(tx, (night, &check.name, attempt), (part, verdict), m).await?;
             }
         }
     }
@@ -98,7 +99,7 @@ async fn check(tx: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<(),
 async fn measurement(
     tx: &mut Rows<'_>,
     (night, check, attempt): (i64, &str, i64),
-    part: &Part,
+    (part, verdict): (&Part, Verdict),
     m: &Measurement,
 ) -> Result<(), QueryError> {
     // SQLite has no NaN, and infinity is not a measurement.
@@ -122,7 +123,7 @@ async fn measurement(
     .bind(m.interval.map(|[_, high]| high))
     .bind(m.n.map(whole))
     .bind(m.verdict.name())
-    .bind(part.verdict.name())
+    .bind(verdict.name())
     .execute(&mut **tx)
     .await?;
     Ok(())

@@ -156,6 +156,13 @@ fn nights_are_read_back_unchanged_in_any_order_and_added_only_once() {
     let e = append(&path, &forged, folder.path()).unwrap_err();
     assert!(matches!(e, HistoryError::ConflictingNight { .. }), "{e}");
     assert_eq!(load(&path, &one).unwrap(), expected);
+
+    let later = folder.path().join("later.json");
+    let mut unknown = nights[0].clone();
+    unknown.version = 999;
+    std::fs::write(&later, serde_json::to_vec(&unknown).unwrap()).unwrap();
+    let e = skinrig_hil::history::read_night(&later).unwrap_err();
+    assert!(e.to_string().contains("version 999"), "{e}");
 }
 
 #[test]

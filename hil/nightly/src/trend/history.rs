@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::Limit;
 
+use crate::judge::part_verdicts;
 use crate::night::{Night, Versions};
 use crate::verdict::Verdict;
 
@@ -136,7 +137,7 @@ impl History {
         let checks = night.checks.iter();
         let last = checks.flat_map(|c| Some((c, c.attempts.last()?)));
         for (check, attempt) in last {
-            for part in &attempt.parts {
+            for (part, verdict) in attempt.parts.iter().zip(part_verdicts(check, attempt)) {
                 for m in &part.measurements {
                     let name = format!("{}/{}/{}", check.name, part.subject, m.metric);
                     let point = Point {
@@ -146,7 +147,7 @@ impl History {
                         n: m.n,
                         limit: m.limit,
                         verdict: m.verdict,
-                        part: part.verdict,
+                        part: verdict,
                         attempts: u32::try_from(check.attempts.len()).unwrap_or(u32::MAX),
                     };
                     self.add(&name, &m.unit, point);

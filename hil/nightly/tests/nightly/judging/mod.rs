@@ -6,14 +6,15 @@ mod support;
 
 use proptest::prelude::*;
 use skinrig_model::Limit;
-use skinrig_nightly::judge::{RepeatRule, judge_attempt};
+use skinrig_nightly::judge::{RepeatRule, judge_attempt, part_verdicts};
 use skinrig_nightly::rules::{
     CROSS_CHECK_RULES, Case, GOLDEN_ON_A_BAD_RIG, RULES, WITNESSES, apply_cross_check_rules,
     apply_rules,
 };
+use skinrig_nightly::trend::History;
 use skinrig_nightly::{Cause, Evidence, EvidenceKind, NightExit, Verdict};
 
-use support::{attempts, check, measured, part};
+use support::{attempts, check, measured, night, part};
 
 const CAUSES: [Cause; 4] = [
     Cause::Infrastructure,
@@ -24,6 +25,41 @@ const CAUSES: [Cause; 4] = [
 
 fn evidence(kind: EvidenceKind, subject: &str) -> Evidence {
     Evidence::new(kind, subject, "something")
+}
+
+/// The values of a device at fault say nothing of it, and those of a check that others made INVALID nothing of any: no trend learns
+/// from them.
+#[test]
+fn trends_leave_out_what_the_rules_made_invalid() {
+    let limit = Limit {
+        at_least: None,
+        at_most: Some(1.0),
+        margin: 0.0,
+    };
+    let measured_in = |subject, value| part(subject, vec![measured("jitter", Some(value), limit)]);
+    let parts = vec![measured_in("camera1", 3.0), measured_in("camera2", 0.5)];
+    let evidence = vec![evidence(EvidenceKind::TriggerFault, "camera1")];
+    let attempt = judge_attempt((0.0, 1.0), parts, evidence, Cause::Rig);
+    assert_eq!(attempt.verdict, Verdict::Invalid);
+    let usable = |of_check: Verdict, attempt: &skinrig_nightly::Attempt| {
+        let mut made = check("trigger_loopback", of_check, None);
+        made.attempts = vec![attempt.clone()];
+        let mut history = History::default();
+        history.push(&night(vec![made]), "here");
+        let points = history.series.iter().map(|s| s.points[0].usable());
+        points.collect::<Vec<_>>()
+    };
+    assert_eq!(usable(Verdict::Invalid, &attempt), [None, Some(0.5)]);
+    let good = judge_attempt(
+        (0.0, 1.0),
+        vec![measured_in("camera1", 0.4), measured_in("camera2", 0.5)],
+        Vec::new(),
+        Cause::Rig,
+    );
+    assert_eq!(usable(Verdict::Pass, &good), [Some(0.4), Some(0.5)]);
+    assert_eq!(usable(Verdict::Invalid, &good), [None, None]);
+    let made = check("trigger_loopback", Verdict::Invalid, None);
+    assert_eq!(part_verdicts(&made, &good), [Verdict::Invalid; 2]);
 }
 
 /// Verdict and cause of an exceeded limit of a skin check, with one piece of evidence.
