@@ -105,7 +105,9 @@ pub(crate) fn read(
         Err(e) => (Default::default(), Some(e.to_string())),
     };
     let analyses = analyses.iter();
-    let analyses = analyses.map(|(name, file)| results::read(file, name, id));
+    let content = seal.as_ref().map(|seal| seal.content_sha256());
+    let read = |(name, file): &(String, PathBuf)| results::read(file, name, id, content.as_deref());
+    let analyses = analyses.map(read);
     let own = reader.notes()?.into_iter().map(|note| NoteEntry {
         later: None,
         text: note.text,

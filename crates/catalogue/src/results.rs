@@ -161,6 +161,8 @@ struct Scored {
 struct Provenance {
     session_id: String,
     #[serde(default)]
+    content_sha256: Option<String>,
+    #[serde(default)]
     results_hash: String,
     #[serde(default)]
     variant: Option<Variant>,
@@ -196,15 +198,25 @@ impl From<Calibration> for CalibrationEntry {
     }
 }
 
-/// Reads the analysis `name` of the session `session_id` from its results file.
-pub(crate) fn read(path: &Path, name: &str, session_id: &str) -> AnalysisEntry {
+/// Reads the analysis `name` of the session `session_id` with this content (of its seal) from its results file.
+pub(crate) fn read(
+    path: &Path,
+    name: &str,
+    session_id: &str,
+    content: Option<&str>,
+) -> AnalysisEntry {
     AnalysisEntry {
         name: name.to_owned(),
-        figures: figures(path, name, session_id),
+        figures: figures(path, name, session_id, content),
     }
 }
 
-fn figures(path: &Path, name: &str, session_id: &str) -> Result<AnalysisFigures, String> {
+fn figures(
+    path: &Path,
+    name: &str,
+    session_id: &str,
+    content: Option<&str>,
+) -> Result<AnalysisFigures, String> {
     let mut text = Vec::new();
     std::fs::File::open(path)
         .and_then(|file| file.take(MOST_BYTES).read_to_end(&mut text))
@@ -215,6 +227,9 @@ fn figures(path: &Path, name: &str, session_id: &str) -> Result<AnalysisFigures,
     let own = &found.provenance;
     if own.session_id != session_id {
         return Err("the results belong to another session".to_owned());
+    }
+    if own.content_sha256.as_deref() != content {
+        return Err("the results are older than the session: analyze it again".to_owned());
     }
     let of = own.variant.as_ref().map_or(OFFICIAL, |v| v.name.as_str());
     if of != name {

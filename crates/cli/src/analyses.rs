@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 use skinrig_catalogue::{ANALYSIS_MARK, RESULTS_SUFFIX};
+use skinrig_recorder::SessionReader;
 use skinrig_report::{Summary, Variant};
 
 use crate::analysis_request::AnalysisRequest;
@@ -15,7 +16,7 @@ use crate::exit::Failure;
 use crate::paths::{beside, folder_of};
 use crate::selection::SelectedPresses;
 
-pub(crate) use self::stored::stored;
+pub(crate) use self::stored::{stored, stored_of};
 pub(crate) use self::summary::{SummaryError, summary};
 
 /// Longest name, in characters.
@@ -183,6 +184,12 @@ pub(crate) fn variant(session: &Path, session_id: &str, name: &str) -> Result<Va
             session.display()
         ))
     })
+}
+
+/// Hash of the session's content, of its seal, `Some(None)` without a seal; `None` if it cannot be read.
+fn content_of(session: &Path) -> Option<Option<String>> {
+    let reader = SessionReader::open(session).ok()?;
+    Some(reader.seal().ok()?.map(|seal| seal.content_sha256()))
 }
 
 #[cfg(test)]

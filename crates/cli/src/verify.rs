@@ -148,8 +148,9 @@ pub(crate) fn check_bundle(
         let stem = beside(&inside, "");
         let stem = stem.file_name().unwrap_or_default().to_string_lossy();
         let copy = scratch.path().join(format!("{stem}{SESSION_SUFFIX}"));
-        checked.analysis = analyses::stored(&copy, &id, None);
-        checked.content_sha256 = seal.map_or_else(String::new, |s| s.content_sha256());
+        let content = seal.map(|s| s.content_sha256());
+        checked.analysis = analyses::stored_of(&copy, (&id, content.as_deref()), None);
+        checked.content_sha256 = content.unwrap_or_default();
     }
     report.problems.extend(wrong);
     checked.report = report;

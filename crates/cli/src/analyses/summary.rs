@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 use skinrig_report::Summary;
 
-use super::results_path;
+use super::{content_of, results_path};
 
 /// The summary is within this many bytes of the end of a results file.
 const TAIL_BYTES: u64 = 1 << 16;
@@ -27,6 +27,9 @@ pub(crate) enum SummaryError {
     /// The results belong to another session.
     #[error("the results beside it belong to another session")]
     OtherSession,
+    /// The session has other content by now: it was resumed, or sealed.
+    #[error("the results beside it are older than the session: analyze it again")]
+    OtherContent,
     /// The results belong to another variant.
     #[error(
         "expected the results of this analysis, found those of `{found}`: analyze the session again"
@@ -65,6 +68,9 @@ pub(crate) fn summary(
     })?;
     if found.session_id != session_id {
         return Err(SummaryError::OtherSession);
+    }
+    if content_of(session).is_none_or(|content| content != found.content_sha256) {
+        return Err(SummaryError::OtherContent);
     }
     match (&found.variant, name) {
         (None, None) => Ok(found),

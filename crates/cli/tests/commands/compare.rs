@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::json::shape;
-use crate::support::{Lab, files, only, skinrig, text};
+use crate::support::{Lab, SMALL, files, only, skinrig, text};
 
 /// Records a small session of a skin and returns its path.
 fn record(lab: &Lab, folder: &str, seed: &str, more: &[&str]) -> String {
@@ -15,6 +15,93 @@ fn record(lab: &Lab, folder: &str, seed: &str, more: &[&str]) -> String {
 fn row<'a>(document: &'a Value, metric: &str) -> &'a Value {
     let rows = document["table"].as_array().unwrap();
     rows.iter().find(|r| r["metric"] == metric).unwrap()
+}
+
+/// The table of a comparison, which is the same as long as the results are.
+fn table(a: &str, b: &str) -> Value {
+    let compared = skinrig(&["--json", "compare", a, b, "--margin", "rmse=8 mm"]);
+    compared.code(0).json()["table"].clone()
+}
+
+#[test]
+fn results_that_were_edited_or_are_older_than_their_session_are_not_used() {
+    let lab = Lab::new();
+    let (a, b) = (record(&lab, "a", "1", &[]), record(&lab, "b", "2", &[]));
+    skinrig(&["analyze", &b]).code(0);
+    let before = table(&a, &b);
+    let path = only(&lab.path("b"), ".results.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let edited = |change: &dyn Fn(&mut Value)| {
+        let mut document: Value = serde_json::from_str(&text).unwrap();
+        change(&mut document);
+        std::fs::write(&path, serde_json::to_string_pretty(&document).unwrap()).unwrap();
+    };
+    let moved: &dyn Fn(&mut Value) = &|document| {
+        for press in document["analysis"]["presses"].as_array_mut().unwrap() {
+            let truth = &mut press["truth"]["x_mm"];
+            *truth = Value::from(truth.as_f64().unwrap() + 2.0);
+        }
+    };
+    edited(moved);
+    assert_eq!(table(&a, &b), before);
+    edited(&|document| {
+        moved(document);
+        document["provenance"]["content_sha256"] = Value::from("0".repeat(64));
+        document["summary"]["content_sha256"] = Value::from("0".repeat(64));
+    });
+    assert_eq!(table(&a, &b), before);
+    let listed = skinrig(&["prototypes", &lab.text("b")]).code(0).out;
+    assert!(!listed.contains("RMSE 2"), "{listed}");
+}
+
+#[test]
+fn sides_of_two_skins_and_of_other_depth_shares_and_planted_faults_are_refused() {
+    let lab = Lab::new();
+    let a = record(&lab, "a", "1", &[]);
+    let add = |folder: &str, seed: &str, set: &str| {
+        let folder = lab.text(folder);
+        let run = [
+            "run",
+            SMALL,
+            "--sessions",
+            &folder,
+            "--no-analysis",
+            "--seed",
+            seed,
+        ];
+        skinrig(&[&run[..], &["--set", set]].concat()).code(0);
+    };
+    add("mixed", "2", "prototype.id=one");
+    add("mixed", "3", "prototype.id=two");
+    skinrig(&["compare", &a, &lab.text("mixed")])
+        .code(2)
+        .expect_stderr(&["several prototypes", "--despite prototypes"]);
+
+    for (folder, depths) in [
+        ("deep", ["1.5 mm", "1.5 mm", "1 mm"]),
+        ("flat", ["1.5 mm", "1 mm", "1 mm"]),
+    ] {
+        for (seed, depth) in (1..).zip(depths) {
+            let depth = format!("depth={depth}");
+            add(folder, &format!("{seed}"), &depth);
+        }
+    }
+    skinrig(&["compare", &lab.text("deep"), &lab.text("flat")])
+        .code(2)
+        .expect_stderr(&[
+            "presses by depth",
+            "67 % at 1.5 mm",
+            "--despite depth-shares",
+        ]);
+
+    let fault = ["--fault", "robot-z-high@contact:3"];
+    let (c, d) = (
+        record(&lab, "c", "4", &fault),
+        record(&lab, "d", "5", &fault),
+    );
+    skinrig(&["compare", &c, &d])
+        .code(2)
+        .expect_stderr(&["a fault was injected", "--despite planted-fault"]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Owns checks that need more than one fact: shared locations and depths, alignment, results, duplicate sessions.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use skinrig_analysis::result::AlignmentStatus;
 use skinrig_model::Reaction;
@@ -10,11 +10,17 @@ use super::difference::{Difference, Severity, difference};
 use crate::locations::Locations;
 use crate::subject::{Session, Subject, join_values};
 
+/// Larger differences between the shares of presses at a depth do not come from a few failed presses.
+const MAX_DEPTH_SHARE_DIFFERENCE: f64 = 0.1;
+
 pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference> {
     let mut found = Vec::new();
     found.extend(check_alignment(subjects));
     found.extend(check_results(subjects, locations));
     found.extend(check_depths(subjects, locations));
+    found.extend(check_depth_shares(subjects, locations));
+    found.extend(check_prototypes(subjects));
+    found.extend(check_planted(subjects));
     found.extend(check_stopped(subjects));
     found.extend(check_locations(subjects, locations));
     found.extend(check_duplicates(subjects));
@@ -125,6 +131,103 @@ fn check_depths(subjects: &[Subject], locations: &Locations) -> Option<Differenc
         values,
         reason,
     ))
+}
+
+/// Errors depend on the depth, and a skin's figure is that of all its presses at the shared depths.
+fn check_depth_shares(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
+    let shares = |s: &Subject| -> BTreeMap<i64, f64> {
+        let mut counts = BTreeMap::new();
+        for press in locations.attempts(s) {
+            let um = (press.press.depth_mm * 1e3).round() as i64;
+            *counts.entry(um).or_insert(0.0) += 1.0;
+        }
+        let all: f64 = counts.values().sum();
+        counts.into_iter().map(|(um, n)| (um, n / all)).collect()
+    };
+    let shares: Vec<BTreeMap<i64, f64>> = subjects.iter().map(shares).collect();
+    let of = |s: &BTreeMap<i64, f64>, um: &i64| s.get(um).copied().unwrap_or(0.0);
+    let differs = shares.iter().any(|own| {
+        !own.is_empty()
+            && own
+                .iter()
+                .any(|(um, share)| (share - of(&shares[0], um)).abs() > MAX_DEPTH_SHARE_DIFFERENCE)
+    });
+    if !differs || shares[0].is_empty() {
+        return None;
+    }
+    let text = |s: &BTreeMap<i64, f64>| {
+        let each = s
+            .iter()
+            .map(|(um, share)| format!("{:.0} % at {} mm", 100.0 * share, *um as f64 * 1e-3));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let values = shares.iter().map(text).collect();
+    let reason =
+        "deeper presses have other errors, so the skin pressed deeper more often looks different";
+    Some(as_blocking(
+        difference(
+            "depth-shares",
+            "presses by depth",
+            Severity::Blocking,
+            values,
+            reason,
+        ),
+        "press both skins equally often at each depth, or select sessions of one depth",
+    ))
+}
+
+/// Sessions of one side are of one skin.
+fn check_prototypes(subjects: &[Subject]) -> Option<Difference> {
+    let prototypes = |s: &Subject| s.fact(|x| Some(x.facts.prototype.clone()));
+    let mixed = subjects.iter().any(|s| prototypes(s).len() > 1);
+    mixed.then(|| {
+        let values = each(subjects, |s| s.facts.prototype.clone());
+        let reason =
+            "a side has sessions of several prototypes; its figure is that of none of them";
+        as_blocking(
+            difference(
+                "prototypes",
+                "prototypes of a side",
+                Severity::Blocking,
+                values,
+                reason,
+            ),
+            "name a prototype instead of a folder, or sessions of one",
+        )
+    })
+}
+
+/// Injected faults that are alike on all sides, which is no difference of facts.
+fn check_planted(subjects: &[Subject]) -> Option<Difference> {
+    let planted = |s: &Session| {
+        let of = |key: &str| {
+            let values = s.facts.values.iter();
+            let own = values.filter(|(name, _)| name.starts_with(key));
+            own.filter(|(_, value)| !matches!(value.as_str(), "[]" | "none"))
+                .map(|(_, value)| value.clone())
+                .collect::<Vec<_>>()
+        };
+        let all = [of("protocol.faults"), of("simulation.faults")].concat();
+        all.join(", ")
+    };
+    let sides: Vec<BTreeSet<String>> = subjects
+        .iter()
+        .map(|s| s.fact(|x| Some(planted(x))))
+        .collect();
+    let alike = sides.iter().all(|s| s.len() == 1 && *s == sides[0]);
+    let any = sides.iter().flatten().any(|faults| !faults.is_empty());
+    (alike && any).then(|| {
+        as_blocking(
+            difference(
+                "planted-fault",
+                "injected faults",
+                Severity::Blocking,
+                each(subjects, planted),
+                "a fault was injected",
+            ),
+            "record without --fault",
+        )
+    })
 }
 
 /// Presses that stopped when they were felt did not reach the depth that their rows state.
