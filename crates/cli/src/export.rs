@@ -20,7 +20,8 @@ use crate::signature;
 /// Writes the requested formats and prints the paths of the files.
 ///
 /// # Errors
-/// [`Failure::input`] for an unreadable session; [`Failure::internal`] when a file cannot be written.
+/// [`Failure::input`] for an unreadable session; [`Failure::internal`] when a file cannot be written; after writing
+/// [`Failure::limit`] for the results of an INVALID one.
 pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
     let is_bundle = args.kinds.contains(&ExportKind::Bundle);
     let targets = selection::sessions(&args.session)?;
@@ -42,12 +43,12 @@ pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
     }
     let mut documents = Vec::new();
     let all = targets.each(|target| {
-        let (folder, written) = export_one(args, target, is_bundle)?;
+        let (folder, written, invalid) = export_one(args, target, is_bundle)?;
         if !json {
             written.iter().for_each(|path| outln!("{}", path.display()));
         }
         documents.push(serde_json::json!({ "folder": folder.path(), "written": written }));
-        Ok(Exit::Ok)
+        invalid.map_or(Ok(Exit::Ok), Err)
     });
     if json && !documents.is_empty() {
         targets.print(documents);
@@ -55,25 +56,25 @@ pub(crate) fn export(args: &ExportArgs, json: bool) -> Outcome {
     all
 }
 
-/// Exports one session; returns the folder and the files.
+/// Exports one session; returns the folder, the files, and the failure of an INVALID session whose results are in them.
 fn export_one(
     args: &ExportArgs,
     target: &Target,
     is_bundle: bool,
-) -> Result<(Folder, Vec<PathBuf>), Failure> {
+) -> Result<(Folder, Vec<PathBuf>, Option<Failure>), Failure> {
     let reader = SessionReader::open(&target.path).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
     let folder = folder(args, target, if is_bundle { ".bundle" } else { ".export" })?;
-    let written = if is_bundle {
+    let (written, invalid) = if is_bundle {
         let mut written = bundle(&target.path, &reader, &header, &folder)?;
         if let Some(key) = &args.sign {
             written.push(signature::sign(key, &folder.path().join(MANIFEST))?);
         }
-        written
+        (written, None)
     } else {
         files(args, target, &reader, &header, &folder)?
     };
-    Ok((folder, written))
+    Ok((folder, written, invalid))
 }
 
 /// The folder given with `--out`, else one beside the session. Files from a selection carry its label.
@@ -142,7 +143,7 @@ fn files(
     reader: &SessionReader,
     header: &RunHeader,
     folder: &Folder,
-) -> Result<Vec<PathBuf>, Failure> {
+) -> Result<(Vec<PathBuf>, Option<Failure>), Failure> {
     let (kinds, tables) = (kinds(&args.kinds), tables(&args.only));
     // Report a taken name before an hour of work, not after.
     let endings: Vec<String> = kinds
@@ -171,7 +172,16 @@ fn files(
     for kind in &kinds {
         written.extend(one_kind(*kind, &source, &tables, folder).map_err(refused)?);
     }
-    Ok(written)
+    let invalid = results.as_ref().filter(|r| !r.analysis.is_valid());
+    let invalid = invalid.map(|results| {
+        Failure::limit(format!(
+            "{0}: INVALID, do not use the exported numbers (`valid` is false in the table of results): {1}\n  next: `skinrig analyze {0}` \
+             says what to mend",
+            target.path.display(),
+            results.analysis.invalid_because().join("; ")
+        ))
+    });
+    Ok((written, invalid))
 }
 
 fn analysis_and_legs(results: &Results) -> (&Analysis, &[LegStart]) {

@@ -13,7 +13,7 @@ use crate::analysis_request::AnalysisRequest;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
 use crate::terminal::Output;
-use crate::tradeoff_file::TradeoffFileError;
+use crate::tradeoff_file::{SessionIdentity, TradeoffFileError};
 
 /// The results of one session.
 pub struct Results {
@@ -125,12 +125,13 @@ fn complete(
     let mut provenance = crate::provenance::provenance(&session.reader, &session.header, &analysis)
         .map_err(Failure::session)?;
     provenance.variant = variant;
+    let identity = SessionIdentity::of(&session.reader).map_err(Failure::session)?;
     Ok(Results {
         session: path.to_owned(),
         analysis,
         legs,
         provenance,
-        tradeoff: crate::tradeoff_file::beside_session(path),
+        tradeoff: crate::tradeoff_file::beside_session(path, &identity),
     })
 }
 

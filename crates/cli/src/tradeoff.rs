@@ -24,7 +24,7 @@ use crate::results::{not_official, open, write};
 use crate::selection;
 use crate::signals::on_ctrl_c;
 use crate::terminal::Output;
-use crate::tradeoff_file::FORMAT;
+use crate::tradeoff_file::{FORMAT, SessionIdentity};
 use skinrig_report::Variant;
 
 /// CPU time of this thread, s.
@@ -241,6 +241,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     if let (Some(variant), Some(out)) = (&variant, &args.out) {
         not_official(&tradeoff_path(&target.path, None), out, variant)?;
     }
+    let identity = SessionIdentity::of(&aligned.session.reader).map_err(Failure::session)?;
     let mut rig = rig_in_words(&aligned.session.header);
     if let Some(variant) = &variant {
         rig += &format!(
@@ -277,7 +278,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     })?;
     let recommendations = recommendations(&measured, args);
     let result = &measured.tradeoff;
-    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "variant": variant, "machine": machine(), "tradeoff": result });
+    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "session": identity, "rig": rig, "variant": variant, "machine": machine(), "tradeoff": result });
     let found = recommendations.iter().map(|a| {
         let found = a.found.as_ref().ok();
         let row = found.map(|f| f.row);

@@ -4,13 +4,32 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use skinrig_analysis::tradeoff::Tradeoff;
+use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::analyses::tradeoff_path;
 
 /// Values of the document's `format` and `format_version`.
-pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 2);
+pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 3);
+
+/// The session of the results, as it was.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub(crate) struct SessionIdentity {
+    pub session_id: String,
+    /// Of its seal; `None` without one.
+    pub content_sha256: Option<String>,
+}
+
+impl SessionIdentity {
+    /// That of an opened session.
+    pub(crate) fn of(reader: &SessionReader) -> Result<Self, RecorderError> {
+        Ok(Self {
+            session_id: reader.session_id()?,
+            content_sha256: reader.seal()?.map(|seal| seal.content_sha256()),
+        })
+    }
+}
 
 /// The trade-off results beside a session cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +49,16 @@ pub enum TradeoffFileError {
         path: PathBuf,
         /// Error of the parser.
         source: serde_json::Error,
+    },
+    /// The results are not of this session as it is.
+    #[error(
+        "{}: expected the trade-off of this session, found that of another one or of an earlier content; next: `skinrig tradeoff` \
+         rewrites it",
+        path.display()
+    )]
+    OtherSession {
+        /// The file.
+        path: PathBuf,
     },
     /// The document has another format or version.
     #[error("{}", Self::wrong_format(path, &format_args!("found {format} version {version}")))]
@@ -54,8 +83,11 @@ impl TradeoffFileError {
     }
 }
 
-/// Reads the results of an earlier `skinrig tradeoff` beside a session; `None` if there are none.
-pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, TradeoffFileError>> {
+/// Reads the results of an earlier `skinrig tradeoff` beside a session with this identity; `None` if there are none.
+pub(crate) fn beside_session(
+    session: &Path,
+    identity: &SessionIdentity,
+) -> Option<Result<Tradeoff, TradeoffFileError>> {
     let path = tradeoff_path(session, None).with_extension("json");
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
@@ -64,7 +96,10 @@ pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, Tradeoff
     };
     Some(match serde_json::from_str::<Document>(&text) {
         Err(source) => Err(TradeoffFileError::Parse { path, source }),
-        Ok(d) if (d.format.as_str(), d.format_version) == FORMAT => Ok(d.tradeoff),
+        Ok(d) if (d.format.as_str(), d.format_version) == FORMAT => match d.session == *identity {
+            true => Ok(d.tradeoff),
+            false => Err(TradeoffFileError::OtherSession { path }),
+        },
         Ok(d) => Err(TradeoffFileError::Version {
             path,
             format: d.format,
@@ -78,5 +113,7 @@ pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, Tradeoff
 struct Document {
     format: String,
     format_version: u32,
+    #[serde(default)]
+    session: SessionIdentity,
     tradeoff: Tradeoff,
 }

@@ -26,6 +26,7 @@ pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     let rows = source
         .analysis
         .map_or_else(Vec::new, |(analysis, _)| metric_rows(analysis));
+    let is_valid = source.analysis.is_some_and(|(a, _)| a.is_valid());
     let session_id = source.reader.session_id()?;
     let text = |of: &dyn Fn(&MetricRow) -> String| {
         Values::Text(rows.iter().map(|r| Some(of(r))).collect())
@@ -47,6 +48,8 @@ pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
             "n",
             Values::Int(rows.iter().map(|r| i64::from(r.estimate.n)).collect()),
         ),
+        // False: INVALID, the numbers must not be used.
+        ("valid", Values::Flag(vec![is_valid; rows.len()])),
     ];
     Ok(Table {
         name: TableName::Results.name(),

@@ -199,6 +199,17 @@ fn a_session_whose_clocks_are_beyond_a_limit_is_invalid_everywhere() {
     assert!(!digits.out.contains("true digits"), "{digits:?}");
 
     let invalid = text(&lab.record("t", &["--set", strict]));
+    let out = lab.text("x");
+    let export = [
+        "export", &invalid, "--to", "csv", "--only", "results", "--out", &out,
+    ];
+    skinrig(&export)
+        .code(4)
+        .expect_stderr(&["INVALID, do not use the exported numbers", "next:"]);
+    let table = std::fs::read_to_string(only(&lab.path("x"), ".results.csv")).unwrap();
+    let valid: Vec<&str> = table.lines().filter_map(|l| l.rsplit(',').next()).collect();
+    assert!(valid[0] == "valid" && valid.len() > 2, "{table}");
+    assert!(valid[1..].iter().all(|v| *v == "0"), "{table}");
     skinrig(&["online", &invalid])
         .code(4)
         .expect_stderr(&["expected a valid session, found an INVALID one", "next:"]);

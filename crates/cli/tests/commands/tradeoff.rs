@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Lab, program, skinrig, text};
+use crate::support::{Lab, only, program, skinrig, text};
 
 /// Nine places: a third of them chooses, the others confirm.
 const PLACES: &str = "path.points=[[10 mm, 2 mm], [-10 mm, 18 mm], [0 mm, -18 mm], [25 mm, 17 mm], [10 mm, 20 mm], \
@@ -164,6 +164,15 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
         output.contains("Not the session&#39;s own settings: analysis.estimator=column_median"),
         "{output}"
     );
+    // Beside another session it is not that of the session.
+    let stranger = text(&lab.record("t", &["--seed", "8"]));
+    let json = own["files"]["results"].as_str().unwrap();
+    let beside = stranger.replace(".session.sqlite", ".tradeoff.json");
+    std::fs::copy(json, beside).unwrap();
+    skinrig(&["report", &stranger]).code(0);
+    let report = std::fs::read_to_string(only(&lab.path("t"), ".report.html")).unwrap();
+    assert!(!report.contains("Error against cost"));
+    assert!(report.contains("found that of another one"), "no reason");
     trade(&[&set[..], &["--out", &page]].concat())
         .code(2)
         .expect_stderr(&["--out"]);
