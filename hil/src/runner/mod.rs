@@ -176,23 +176,28 @@ impl NightRun<'_, '_> {
             let began_s = self.elapsed().as_secs_f64();
             let findings = self.make(check);
             if let Some(reason) = findings.not_applicable {
-                return CheckResult {
-                    skipped: Some(reason),
-                    ..result
-                };
+                if attempts.is_empty() {
+                    return CheckResult {
+                        skipped: Some(reason),
+                        ..result
+                    };
+                }
+                // What an earlier attempt found stands.
+                ended = Some(format!("a repeat did not apply: {reason}"));
+                break;
             }
             attempts.push(self.judge(check, findings, began_s));
             if !rule.should_repeat(&attempts) {
                 break;
             }
             if self.bench.stop_requested() {
-                ended = Some("not repeated: the suite was stopped");
+                ended = Some("not repeated: the suite was stopped".to_owned());
                 break;
             }
             // A repeat must leave time for all remaining checks.
             if self.left().0 < planned.0 + self.runner.planned_from(at + 1).0 {
-                ended =
-                    Some("not repeated: the remaining budget is needed for the remaining checks");
+                let why = "not repeated: the remaining budget is needed for the remaining checks";
+                ended = Some(why.to_owned());
                 break;
             }
             // Reopening may find a missing device or recover one that hangs.
@@ -201,7 +206,7 @@ impl NightRun<'_, '_> {
         let mut result = with_attempts(result, rule, attempts);
         if let Some(reason) = ended {
             let before = result.repeats.take().map_or(String::new(), |r| r + "; ");
-            result.repeats = Some(before + reason);
+            result.repeats = Some(before + &reason);
         }
         result
     }

@@ -45,6 +45,12 @@ pub(crate) fn reproduce(args: &ReproduceArgs, json: bool) -> Outcome {
     }
     match signature::verify(&folder.join(METADATA), args.signers.as_deref()) {
         Ok(None) => {}
+        // Whose key it is has to be known before a signature says anything.
+        Ok(Some(signature)) if signature.signer.is_none() => {
+            if !checks.is_quiet {
+                outln!("note  signature: {signature}");
+            }
+        }
         Ok(Some(signature)) => checks.add(Check::pass("signature", signature.to_string())),
         Err(e) if e.is_verdict() => {
             checks.add(Check::fail("signature", "one that counts", e.to_string()))

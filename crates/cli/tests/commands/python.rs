@@ -173,6 +173,7 @@ fn results(document: &Value) -> Truth {
         for key in ["value", "low", "high", "n"] {
             table.put(key, found[key].clone());
         }
+        table.put("valid", document["valid"].clone());
     };
     let metrics = [
         "rmse",

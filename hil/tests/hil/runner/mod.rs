@@ -321,6 +321,22 @@ fn a_golden_skin_beyond_its_limits_is_invalid_when_the_rig_was_faulty_in_the_sam
     }
 }
 
+/// A camera that no longer offers what a check needs does not undo what it did before.
+#[test]
+fn a_repeat_that_does_not_apply_leaves_the_failure() {
+    let night = run_suite(
+        &suite(600, IDLE),
+        &Script::default()
+            .attempt("idle", |f| add_losses(f, [0.0, 7.0]))
+            .attempt("idle", |f| f.not_applicable = Some("not here".to_owned())),
+    );
+    let idle = result_of(&night, "idle");
+    assert_eq!((idle.verdict, idle.attempts.len()), (Verdict::Fail, 1));
+    assert_eq!(idle.skipped, None);
+    let repeats = idle.repeats.as_deref();
+    assert_eq!(repeats, Some("a repeat did not apply: not here"));
+}
+
 #[test]
 fn a_night_with_only_skipped_checks_is_not_good() {
     let night = run_suite(
