@@ -19,7 +19,9 @@ fn refresh(lab: &Lab) -> Registration {
 }
 
 /// Results of an analysis with an RMSE, as far as the catalogue reads them.
-fn results(session_id: &str, rmse_mm: f64, variant: Option<&str>) -> String {
+fn results(of: &SessionReader, rmse_mm: f64, variant: Option<&str>) -> String {
+    let session_id = of.session_id().unwrap();
+    let content = of.seal().unwrap().unwrap().content_sha256();
     let variant = match variant {
         None => "null".to_owned(),
         Some(name) => format!(r#"{{"name": "{name}", "changed": ["analysis.bin=2px"]}}"#),
@@ -31,7 +33,7 @@ fn results(session_id: &str, rmse_mm: f64, variant: Option<&str>) -> String {
             "calibration": {{"model": "yaw", "names": ["yaw_1", "yaw_2"], "values": [0.5, 0.25],
                 "standard_errors": [null, 0.1], "rmse_before_mm": 4.0, "rmse_after_mm": 2.0, "n": 9}},
             "scored": {{"rmse_mm": {{"value": {rmse_mm}, "low": 1.0, "high": 2.0, "n": 8}}}}}},
-          "provenance": {{"session_id": "{session_id}", "results_hash": "abc", "variant": {variant}}},
+          "provenance": {{"session_id": "{session_id}", "content_sha256": "{content}", "results_hash": "abc", "variant": {variant}}},
           "summary": {{}}, "valid": true}}"#
     )
 }
@@ -41,9 +43,13 @@ fn a_session_is_registered_as_it_is_in_its_file_and_once() {
     let lab = Lab::with_sessions(2);
     let reader = SessionReader::open(lab.session(1)).unwrap();
     let id = reader.session_id().unwrap();
-    std::fs::write(lab.path().join("1.results.json"), results(&id, 1.5, None)).unwrap();
+    std::fs::write(
+        lab.path().join("1.results.json"),
+        results(&reader, 1.5, None),
+    )
+    .unwrap();
     let variant = lab.path().join("1.analysis-bin=2px.results.json");
-    std::fs::write(variant, results(&id, 1.25, Some("bin=2px"))).unwrap();
+    std::fs::write(variant, results(&reader, 1.25, Some("bin=2px"))).unwrap();
     annotate(
         &lab.session(1),
         &Annotation {
@@ -132,17 +138,33 @@ fn a_session_is_registered_as_it_is_in_its_file_and_once() {
     assert_eq!(lab.dump(), both);
 }
 
+/// A session that was resumed since has other presses.
+#[test]
+fn results_of_an_earlier_content_are_a_problem() {
+    let lab = Lab::with_sessions(1);
+    let reader = SessionReader::open(lab.session(0)).unwrap();
+    let content = reader.seal().unwrap().unwrap().content_sha256();
+    let older = results(&reader, 1.5, None).replace(&content, &"0".repeat(64));
+    std::fs::write(lab.path().join("0.results.json"), older).unwrap();
+    lab.open().register(&[lab.session(0)]).unwrap();
+    let sql = "SELECT rmse_mm, problem FROM analysis";
+    let expected = "rmse_mm=null|problem=the results are older than the session: analyze it again";
+    assert_eq!(rows(&lab.file(), sql), [expected]);
+}
+
 #[test]
 fn what_changes_is_stale_until_it_is_registered() {
     let lab = Lab::with_sessions(3);
     assert_eq!(stale(&lab).len(), 3);
     refresh(&lab);
     assert_eq!(stale(&lab), [""; 0]);
-    let id = SessionReader::open(lab.session(0))
-        .unwrap()
-        .session_id()
-        .unwrap();
-    std::fs::write(lab.path().join("0.results.json"), results(&id, 1.5, None)).unwrap();
+    let reader = SessionReader::open(lab.session(0)).unwrap();
+    std::fs::write(
+        lab.path().join("0.results.json"),
+        results(&reader, 1.5, None),
+    )
+    .unwrap();
+    drop(reader);
     std::fs::remove_file(lab.session(1)).unwrap();
     std::fs::write(lab.session(2), "no session").unwrap();
     common::sealed(&lab.session(3), 3);
