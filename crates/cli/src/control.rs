@@ -157,9 +157,11 @@ fn send(session: &Path, request: &Request) -> Result<u64, Failure> {
     match ask(session, request) {
         Ok(Reply::Handed(number)) => Ok(number),
         Ok(Reply::Refused(why)) => Err(Failure::input(format!("{}: {why}", session.display()))),
-        Ok(Reply::Live(_) | Reply::Newest(_) | Reply::Touch(_)) => Err(Failure::internal(
-            "expected the number of the request, found another reply: is the run of another version of skinrig?",
-        )),
+        Ok(Reply::Live(_) | Reply::Newest(_) | Reply::Touch(_) | Reply::TouchesEnded) => {
+            Err(Failure::internal(
+                "expected the number of the request, found another reply: is the run of another version of skinrig?",
+            ))
+        }
         Err(error) => Err(remote_failure(session, error)),
     }
 }

@@ -1,8 +1,9 @@
 //! Control of a run from another terminal, over a Unix socket beside the session.
 //!
 //! A request and its reply are one line of JSON each; touches are a line each until the run ends. Only the user of the run and root
-//! may connect; there is no network port. The controller never waits for a terminal: requests are bits of its [`ControlHandle`](skinrig_controller::ControlHandle), notes go
-//! through a short queue, and the progress is a copy that it updates while no terminal reads it.
+//! may connect; there is no network port. The controller never waits for a terminal: requests are bits of its
+//! [`ControlHandle`](skinrig_controller::ControlHandle), notes go through a short queue, and the progress is a copy that it updates
+//! while no terminal reads it.
 
 mod answer;
 mod board;

@@ -142,7 +142,9 @@ fn serve(
         Err(why) => Reply::Refused(why.to_string()),
         Ok(()) => match read_request(&mut stream)? {
             Err(why) => Reply::Refused(why.to_string()),
-            Ok(Request::Touches) if !may_stay => Reply::Refused("too many callers".to_owned()),
+            Ok(Request::Touches) if !may_stay => Reply::Refused(format!(
+                "expected at most {MOST_AT_ONCE} callers at once, found more: try again"
+            )),
             Ok(request) => {
                 let mut answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
                 let answered = (*answer)(request);
@@ -151,9 +153,10 @@ fn serve(
                     Answer::Once(reply) => reply,
                     Answer::Touches(touches) => {
                         stream.set_write_timeout(Some(TAKE_WITHIN))?;
-                        return touches
-                            .iter()
-                            .try_for_each(|touch| write_line(&mut stream, &Reply::Touch(touch)));
+                        for touch in touches {
+                            write_line(&mut stream, &Reply::Touch(touch))?;
+                        }
+                        Reply::TouchesEnded
                     }
                 }
             }
@@ -204,7 +207,7 @@ fn read_request(stream: &mut UnixStream) -> io::Result<Result<Request, RequestEr
 
 #[cfg(test)]
 mod tests {
-    use super::super::client::ask;
+    use super::super::client::{ask, follow};
     use super::super::error::RemoteError;
     use super::super::wire::RunRequest;
     use super::*;
@@ -266,6 +269,20 @@ mod tests {
         fs::write(&far, "").unwrap();
         let running = server(&far);
         assert_eq!(ask(&far, &PAUSE).unwrap(), Reply::Handed(7));
+        drop(running);
+    }
+
+    /// A killed run ends the connection without saying so.
+    #[test]
+    fn the_last_reply_about_touches_says_that_the_run_has_ended() {
+        let (_folder, session) = session();
+        let (touches, queue) = std::sync::mpsc::sync_channel(1);
+        let mut queue = Some(queue);
+        let running = Server::open(&session, move |_| Answer::Touches(queue.take().unwrap()));
+        drop(touches);
+        let mut replies = Vec::new();
+        follow(&session, &Request::Touches, |reply| replies.push(reply)).unwrap();
+        assert_eq!(replies, [Reply::TouchesEnded]);
         drop(running);
     }
 

@@ -68,6 +68,8 @@ pub(crate) enum Reply {
     Newest([NewestEvents; 2]),
     /// A touch.
     Touch(TouchLine),
+    /// No more touches: the run has ended. Without it the connection was lost, or the run was killed.
+    TouchesEnded,
     /// Accepted; the number of the request or note.
     Handed(u64),
     /// Refused, with the reason.

@@ -25,7 +25,7 @@ pub(crate) fn status(args: &StatusArgs, as_json: bool) -> Outcome {
         Ok(Reply::Live(live)) => (Some(live), None),
         Ok(Reply::Refused(why)) => (None, Some(why)),
         Err(RemoteError::Failed(why)) => (None, Some(why.to_string())),
-        Ok(Reply::Handed(_) | Reply::Newest(_) | Reply::Touch(_))
+        Ok(Reply::Handed(_) | Reply::Newest(_) | Reply::Touch(_) | Reply::TouchesEnded)
         | Err(RemoteError::NotListening) => (None, None),
     };
     let stored = match stored(&session) {

@@ -13,22 +13,30 @@ use crate::sessions;
 /// Waits for a run at `place`, looking `every` so often, and prints its touches until it ends.
 ///
 /// # Errors
-/// [`Failure::input`] if the run feels none, or no run writes the session.
+/// [`Failure::input`] if the run feels none, or no run writes the session; [`Failure::internal`] if the connection is lost.
 pub(super) fn follow(place: &Path, every: Duration) -> Outcome {
     let (mut is_announced, mut was_idle) = (false, false);
     loop {
         let mut is_idle = true;
         if let Some(session) = sessions::find_if_any(place)? {
             is_idle = writer_of(&session).is_none();
-            let mut refused = None;
+            let (mut has_ended, mut refused) = (false, None);
             let followed = follow_run(&session, &Request::Touches, |reply| match reply {
                 Reply::Touch(touch) => outln!("{}", json!(touch)),
+                Reply::TouchesEnded => has_ended = true,
                 Reply::Refused(why) => refused = Some(why),
                 _ => {}
             });
             match (followed, refused) {
                 (_, Some(why)) => return Err(failure(&session, &why)),
-                (Ok(()), None) => return Ok(Exit::Ok),
+                (Ok(()), None) if has_ended => return Ok(Exit::Ok),
+                (Ok(()), None) => {
+                    return Err(Failure::internal(format!(
+                        "{0}: expected touches until the run ends, found the connection ended before: the run was killed, or this \
+                         program read too slowly\n  next: `skinrig status {0}` shows whether it goes on; then repeat the command",
+                        session.display()
+                    )));
+                }
                 (Err(RemoteError::Failed(why)), None) => {
                     return Err(Failure::internal(format!("{}: {why}", session.display())));
                 }

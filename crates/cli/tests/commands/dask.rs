@@ -211,7 +211,7 @@ fn what_is_no_cluster_is_refused_with_the_next_step() {
 
 /// Two workers against one, with as many sessions as `SKINRIG_SESSIONS` says.
 #[test]
-#[ignore = "minutes; prints a measurement"]
+#[ignore = "measures, minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig --test commands -- --ignored --nocapture two_workers"]
 fn two_workers_against_one() {
     let sessions = std::env::var("SKINRIG_SESSIONS").map_or(100, |n| n.parse().unwrap());
     let lab = Lab::new();
