@@ -1,12 +1,13 @@
 //! `skinrig online`, and touch felt while recording: what a replay prints, how presses react, sessions without enough to learn from.
 
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
 use skinrig_model::{TouchEstimate, TouchKind};
 use skinrig_recorder::SessionReader;
 
-use crate::support::{Lab, SMALL, only, program, skinrig, text};
+use crate::python::interpreter;
+use crate::support::{Lab, ROOT, SMALL, only, program, skinrig, text};
 
 /// Three repetitions calibrate, one scores.
 fn session(lab: &Lab) -> String {
@@ -136,6 +137,19 @@ fn presses_stop_when_they_are_felt_while_recording() {
     assert!(estimates(&again.touches().unwrap()) == estimates(&touches));
 }
 
+/// The program of `docs/how-to` sends these lines on.
+fn sent_over_lsl_and_dds(lab: &Lab, lines: &str) {
+    let Some(python) = interpreter() else { return };
+    let file = lab.path("touches.jsonl");
+    std::fs::write(&file, lines).unwrap();
+    let output = Command::new(python)
+        .arg(format!("{ROOT}/tests/python/touches.py"))
+        .args([file.as_os_str(), lab.path("").as_os_str()])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+}
+
 /// Another program gets what the session records.
 #[test]
 #[cfg(unix)]
@@ -154,8 +168,8 @@ fn another_program_follows_what_is_felt() {
     let waited = String::from_utf8(output.stderr).unwrap();
     assert!(waited.contains("no run yet"), "{waited}");
     let facts = |t_s: f64, rest: Value| (format!("{t_s:.6}"), rest.to_string());
-    let followed: Vec<_> = String::from_utf8(output.stdout)
-        .unwrap()
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let followed: Vec<_> = lines
         .lines()
         .map(|line| {
             let line: Value = serde_json::from_str(line).unwrap();
@@ -175,6 +189,7 @@ fn another_program_follows_what_is_felt() {
         .collect();
     assert!(recorded.len() > 10, "{recorded:?}");
     assert_eq!(followed, recorded);
+    sent_over_lsl_and_dds(&lab, &lines);
 
     // Nothing comes of a session that has ended, or of a run that feels nothing.
     skinrig(&["watch", &session, "--touches", "--every", "5 ms"])

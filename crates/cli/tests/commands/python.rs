@@ -43,7 +43,7 @@ impl Truth {
 }
 
 /// Path of the interpreter; `None`, with the reason on standard error, without one.
-fn interpreter() -> Option<String> {
+pub(crate) fn interpreter() -> Option<String> {
     let python = std::env::var("SKINRIG_PYTHON").ok();
     if python.is_none() {
         eprintln!("skipped: no SKINRIG_PYTHON, an interpreter with tests/python/requirements.txt");
