@@ -1,19 +1,28 @@
-//! `skinrig scene check`: statistics of the events of a session.
+//! `skinrig scene check`: statistics of the events of recordings.
 
-use skinrig_analysis::event_statistics::event_statistics;
+use std::path::Path;
+
+use skinrig_analysis::event_statistics::{EventStatistics, EventStatisticsCollector};
+use skinrig_analysis::{Analysis, EventSource};
+use skinrig_formats::inspect::FileKind;
+use skinrig_formats::raw::RawReader;
 use skinrig_model::CameraId;
-use skinrig_report::scene_check::terminal_text;
+use skinrig_report::scene_check::{Recording, page, terminal_text};
+use skinrig_results::{Origin, SessionEvents};
 
 use crate::analysis_request::AnalysisRequest;
 use crate::args::{SceneArgs, SceneCheckArgs, SceneCommand};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
-use crate::results::open;
+use crate::results::{open, write};
+
+/// Recordings that fit side by side on a page.
+const MOST_ON_PAGE: usize = 4;
 
 /// Runs the command of `scene`.
 ///
 /// # Errors
-/// [`Failure::input`] for a session that cannot be read.
+/// [`Failure::input`] for a recording that cannot be read.
 pub(crate) fn scene(args: &SceneArgs, json: bool) -> Outcome {
     match &args.command {
         SceneCommand::Check(args) => check(args, json),
@@ -21,19 +30,115 @@ pub(crate) fn scene(args: &SceneArgs, json: bool) -> Outcome {
 }
 
 fn check(args: &SceneCheckArgs, json: bool) -> Outcome {
-    let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
-    let phase = Phase::begin("reading the events");
-    let of = |camera| event_statistics(&aligned.events, camera);
-    let (one, two) = rayon::join(|| of(CameraId::One), || of(CameraId::Two));
-    drop(phase);
-    let failed = |e| Failure::input(format!("{}: {e}", args.session.display()));
-    let cameras = [one.map_err(failed)?, two.map_err(failed)?];
+    let count = args.recordings.len();
+    if args.out.is_some() && count > MOST_ON_PAGE {
+        return Err(Failure::input(format!(
+            "expected at most {MOST_ON_PAGE} recordings for a page, found {count}\n  next: leave out --out, or some of them"
+        )));
+    }
+    let recordings = args.recordings.iter().map(|path| recording(path));
+    let recordings = recordings.collect::<Result<Vec<_>, _>>()?;
+    if let Some(out) = &args.out {
+        write(out, page(&recordings).as_bytes())?;
+    }
     if json {
-        crate::terminal::print_json(
-            &serde_json::json!({ "session": args.session, "cameras": cameras }),
-        );
+        let rows = recordings.iter().map(|r| {
+            serde_json::json!({
+                "recording": r.name, "origin": r.origin, "cameras": r.cameras, "without_presses": r.without_presses,
+            })
+        });
+        let rows: Vec<_> = rows.collect();
+        crate::terminal::print_json(&serde_json::json!({ "recordings": rows, "page": args.out }));
     } else {
-        outln!("{}", terminal_text(&cameras));
+        outln!("{}", terminal_text(&recordings));
+        if let Some(out) = &args.out {
+            outln!("\npage  {}", out.display());
+        }
     }
     Ok(Exit::Ok)
+}
+
+fn recording(path: &Path) -> Result<Recording, Failure> {
+    let phase = Phase::begin("reading the events");
+    let found = match FileKind::detect(path).map_err(Failure::input)? {
+        FileKind::Raw => of_raw(path),
+        FileKind::Sqlite => of_session(path),
+        FileKind::Hdf5 | FileKind::Unknown => Err(Failure::input(format!(
+            "{}: expected a session or a Prophesee RAW file, found neither\n  next: `skinrig import` makes a session of other files",
+            path.display()
+        ))),
+    };
+    drop(phase);
+    found
+}
+
+fn of_raw(path: &Path) -> Result<Recording, Failure> {
+    let mut reader = RawReader::open(path).map_err(Failure::input)?;
+    let mut decoder = reader.decoder();
+    let mut collector = EventStatisticsCollector::new(&[]);
+    loop {
+        let bytes = reader.next_chunk().map_err(Failure::input)?;
+        if bytes.is_empty() {
+            break;
+        }
+        decoder.for_each_slice(bytes, |events| collector.push(events));
+    }
+    Ok(Recording {
+        name: path.display().to_string(),
+        origin: "RAW file".to_owned(),
+        is_stand_in: false,
+        without_presses: None,
+        cameras: vec![collector.finish(CameraId::One)],
+    })
+}
+
+fn of_session(path: &Path) -> Result<Recording, Failure> {
+    let (aligned, _) = open(path, AnalysisRequest::default())?;
+    let header = aligned.session.header.clone();
+    let origin = Origin::of(&header);
+    let (name, formats) = (aligned.session.path.clone(), header.stream_formats);
+    let events = SessionEvents::new(&name, formats, &aligned.input.legs);
+    // The analysis gives the clocks of the cameras. Without it the events are still counted.
+    let analysis = aligned.analyze();
+    let (analysis, without_presses) = match analysis {
+        Ok(found) => (Some(found.analysis), None),
+        Err(e) => (None, Some(e.to_string())),
+    };
+    let of = |camera| statistics(&events, camera, analysis.as_ref());
+    let (one, two) = rayon::join(|| of(CameraId::One), || of(CameraId::Two));
+    let failed = |e| Failure::input(format!("{}: {e}", path.display()));
+    let kind = origin.map_or("of unknown origin", Origin::name);
+    Ok(Recording {
+        name: path.display().to_string(),
+        origin: if header.rig_name.starts_with(kind) {
+            header.rig_name
+        } else {
+            format!("{kind}, {}", header.rig_name)
+        },
+        is_stand_in: matches!(origin, Some(Origin::Simulated | Origin::Emulated)),
+        without_presses,
+        cameras: vec![one.map_err(failed)?, two.map_err(failed)?],
+    })
+}
+
+fn statistics(
+    events: &SessionEvents,
+    camera: CameraId,
+    analysis: Option<&Analysis>,
+) -> Result<EventStatistics, skinrig_analysis::EventSourceError> {
+    let clock = analysis.and_then(|a| a.clocks[camera.index()]);
+    let timings = analysis
+        .iter()
+        .flat_map(|a| &a.presses)
+        .filter_map(|p| p.timing);
+    let presses: Vec<(f64, f64)> = match clock {
+        Some(clock) => timings
+            .map(|t| [t.contact, t.retract].map(|at| clock.camera_us(at.as_secs_f64() * 1e6)))
+            .map(|[contact_us, lift_us]| (contact_us, lift_us))
+            .collect(),
+        None => Vec::new(),
+    };
+    let mut collector = EventStatisticsCollector::new(&presses);
+    events.for_each_slice(camera, &mut |slice| collector.push(slice))?;
+    Ok(collector.finish(camera))
 }

@@ -6,11 +6,8 @@ use skinrig_model::{Point2, PressRole, Verdict};
 
 use super::finding::finding;
 use crate::metrics::spread_mm;
-use crate::result::{Analysis, Evidence, Fault, Finding, Law, PressResult};
+use crate::result::{Analysis, Evidence, Fault, Finding, Law, MOST_OF_GUESS, PressResult};
 
-/// Above this share of the error of a constant guess (mean position), an RMSE says nothing about the skin: cameras,
-/// positions or times are not what they seem, or the skin is dead.
-const MAX_SHARE: f64 = 0.7;
 /// Minimum number of locations for a statement.
 const MIN_PLACES: usize = 4;
 
@@ -28,7 +25,7 @@ pub(super) fn findings(analysis: &Analysis) -> Option<Finding> {
         analysis.scored.rmse_mm.value?,
         spread_mm(truths.iter().copied()),
     );
-    (places.len() >= MIN_PLACES && rmse_mm > MAX_SHARE * ignorance_mm).then(|| {
+    (places.len() >= MIN_PLACES && rmse_mm > MOST_OF_GUESS * ignorance_mm).then(|| {
         let evidence = Evidence::NoBetterThanGuess {
             rmse_mm,
             guess_mm: ignorance_mm,

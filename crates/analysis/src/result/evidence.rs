@@ -9,6 +9,10 @@ use super::evidence_parts::{FittingPlan, OnsetHeight, PeakForce, Response, SeenM
 use super::other_reading::OtherReading;
 use crate::with_text::with_text;
 
+/// Above this share of the error of a constant guess (mean position), an RMSE says nothing about the skin: cameras, positions or
+/// times are not what they seem, or the skin is dead.
+pub(crate) const MOST_OF_GUESS: f64 = 0.7;
+
 /// What was expected and what was found. In JSON `kind`, fields, and `text`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(remote = "Self", tag = "kind", rename_all = "snake_case")]
@@ -522,8 +526,9 @@ pub enum Evidence {
     },
     /// The error is that of a guess.
     #[error(
-        "expected an error below that of a constant guess, found RMSE {rmse_mm:.1} mm where guessing the mean position \
-         gives {guess_mm:.1} mm (n {presses})"
+        "expected an RMSE of at most {:.0} % of a constant guess, found {rmse_mm:.1} mm where guessing the mean position gives \
+         {guess_mm:.1} mm (n {presses})",
+        MOST_OF_GUESS * 100.0
     )]
     NoBetterThanGuess {
         /// RMSE of the scored presses, mm.

@@ -234,8 +234,8 @@ fn of_positions() -> Vec<(Value, &'static str)> {
         ),
         (
             json!({"kind": "no_better_than_guess", "rmse_mm": 20.0, "guess_mm": 18.5, "presses": 25}),
-            "expected an error below that of a constant guess, found RMSE 20.0 mm where guessing the mean position gives 18.5 \
-             mm (n 25)",
+            "expected an RMSE of at most 70 % of a constant guess, found 20.0 mm where guessing the mean position gives 18.5 mm \
+             (n 25)",
         ),
     ]
 }

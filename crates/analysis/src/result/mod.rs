@@ -36,6 +36,7 @@ pub use campaign::CampaignLooks;
 pub use clock_map::{ClockMap, MapName};
 pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
 pub use evidence::Evidence;
+pub(crate) use evidence::MOST_OF_GUESS;
 pub(crate) use evidence_parts::{
     FittingPlan, OnsetHeight, PeakForce, Response, SeenMarks, Silence,
 };

@@ -80,7 +80,8 @@ fn json_keys_are_stable() {
     insta::assert_snapshot!("report", shape(&json(&["report", &session])));
     let scene = json(&["scene", "check", &session]);
     insta::assert_snapshot!("scene", shape(&scene));
-    assert!(scene["cameras"][1]["events"].as_u64() > Some(0), "{scene}");
+    let cameras = &scene["recordings"][0]["cameras"];
+    assert!(cameras[1]["events"].as_u64() > Some(0), "{scene}");
     insta::assert_snapshot!("verify", shape(&json(&["verify", &session])));
     let export = json(&["export", &session, "--to", "all", "--out", &lab.text("e")]);
     insta::assert_snapshot!("export", shape(&export));

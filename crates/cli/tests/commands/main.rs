@@ -47,6 +47,7 @@ mod replay;
 mod resume;
 mod rigs;
 mod sample_size;
+mod scene;
 mod selection;
 #[path = "../../../notify/tests/it/servers.rs"]
 mod servers;

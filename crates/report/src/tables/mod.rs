@@ -1,5 +1,6 @@
 //! Owns the data tables of the page (press table, tooltips, CSV downloads) and the small tables of settings and calibration.
 
+mod events;
 mod packing;
 mod studies;
 mod table;
@@ -14,6 +15,7 @@ use skinrig_settings::Settings;
 
 use crate::derive;
 use crate::input::ReportInput;
+pub(crate) use events::of_events;
 pub(crate) use table::Table;
 
 /// Data for the script: session ID and named tables.

@@ -1,0 +1,63 @@
+//! `skinrig scene check`: sessions and RAW files side by side, and what it refuses.
+
+use crate::support::{Lab, only, skinrig, text};
+
+#[test]
+fn recordings_stand_side_by_side() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    // The stream of the first camera as a RAW file is the same recording.
+    let folder = lab.text("raw");
+    skinrig(&["export", &session, "--to", "raw", "--out", &folder]).code(0);
+    let raw = text(&only(&lab.path("raw"), ".camera1.raw"));
+    let page = lab.text("check.html");
+    let arguments = ["scene", "check", &session, &raw, "--out", &page];
+    let found = skinrig(&[&["--json"], &arguments[..]].concat())
+        .code(0)
+        .json();
+    let rows = found["recordings"].as_array().unwrap();
+    let (camera, alone) = (&rows[0]["cameras"][0], &rows[1]["cameras"][0]);
+    for key in [
+        "events",
+        "on_share",
+        "intervals",
+        "pixels",
+        "correlation",
+        "dispersion",
+    ] {
+        assert_eq!(camera[key], alone[key], "{key}");
+        assert!(!camera[key].is_null(), "{key}");
+    }
+    // Only a session knows its presses. In this scene a dent darkens the skin, and a lift brightens it again.
+    assert!(alone["polarity"].is_null());
+    let polarity = &camera["polarity"];
+    let share = |key: &str| polarity[key].as_f64().unwrap();
+    assert!(share("on_at_press") < 0.4, "{polarity}");
+    assert!(share("on_at_lift") > 0.6, "{polarity}");
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(html.contains("Events around an event") && html.contains("simulated"));
+
+    let told = skinrig(&arguments).code(0).out;
+    assert!(
+        told.contains("A camera 1") && told.contains("check.html"),
+        "{told}"
+    );
+}
+
+#[test]
+fn too_many_and_other_files_are_refused() {
+    let lab = Lab::new();
+    let other = lab.text("notes.txt");
+    std::fs::write(&other, "notes").unwrap();
+    skinrig(&["scene", "check", &other])
+        .code(2)
+        .expect_stderr(&[
+            "expected a session or a Prophesee RAW file",
+            "next: `skinrig import`",
+        ]);
+    let page = lab.text("check.html");
+    let five = vec![other.as_str(); 5];
+    skinrig(&[&["scene", "check", "--out", &page][..], &five].concat())
+        .code(2)
+        .expect_stderr(&["expected at most 4 recordings for a page, found 5"]);
+}
