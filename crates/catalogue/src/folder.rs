@@ -50,7 +50,9 @@ impl Folder {
                     of.push((analysis.to_owned(), file.clone()));
                 };
                 add(&mut results, base, OFFICIAL);
-                if let Some((stem, variant)) = base.rsplit_once(ANALYSIS_MARK) {
+                if let Some((stem, variant)) = base.rsplit_once(ANALYSIS_MARK)
+                    && variant != OFFICIAL
+                {
                     add(&mut results, stem, variant);
                 }
             }

@@ -17,6 +17,7 @@ mod insert;
 mod listing;
 mod nights;
 mod open;
+mod press;
 mod prototypes;
 mod question;
 mod questions;
@@ -33,6 +34,7 @@ pub use error::CatalogueError;
 pub use listing::{ListedSession, OfficialResult};
 pub use nights::NightRegistration;
 pub use open::Access;
+pub use press::PressEntry;
 pub use question::{Answer, Parameter, ParameterKind, Question};
 
 pub use results::{
