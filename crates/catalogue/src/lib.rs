@@ -31,7 +31,7 @@ pub use address::{Address, CATALOGUE_FILE, ServerUrl};
 pub use catalogue::{Catalogue, Registration};
 pub use entry::{LegEntry, NoteEntry, SessionEntry};
 pub use error::CatalogueError;
-pub use listing::{ListedSession, OfficialResult};
+pub use listing::{ListedAnalysis, ListedSession, Listing};
 pub use nights::NightRegistration;
 pub use open::Access;
 pub use press::PressEntry;

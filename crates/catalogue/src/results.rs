@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use skinrig_recorder::SESSION_SUFFIX;
 
 use crate::press::{self, Press, PressEntry};
@@ -113,8 +114,24 @@ struct Document {
     provenance: Provenance,
     /// Lists of many sessions read it; without it the results are those of an older version.
     #[serde(rename = "summary")]
-    _summary: serde::de::IgnoredAny,
+    _summary: Summary,
     valid: bool,
+}
+
+/// The part that a list of sessions shows. It does so for those alone that have all of it.
+#[derive(Deserialize)]
+#[expect(dead_code, reason = "only has to be there")]
+struct Summary {
+    session_id: String,
+    #[serde(default)]
+    content_sha256: Option<String>,
+    analysis_version: u32,
+    results_hash: String,
+    valid: bool,
+    counts: IgnoredAny,
+    rmse_mm: EstimateEntry,
+    repeat_std_mm: EstimateEntry,
+    located_rate: EstimateEntry,
 }
 
 #[derive(Deserialize)]

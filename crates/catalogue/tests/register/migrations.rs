@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError};
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{AssertSqlSafe, ConnectOptions, Connection, Executor, SqlSafeStr};
+use sqlx::{ConnectOptions, Connection, Executor, SqlSafeStr};
 
 use crate::support::{Lab, TABLES, WAIT, column, dump, rows};
 use crate::{sessions, synthetic};
@@ -20,12 +20,17 @@ fn files() -> Vec<PathBuf> {
     files
 }
 
+/// Statements of a test, which live as long as it.
+fn fixed(text: String) -> &'static str {
+    text.leak()
+}
+
 /// The first `count` migrations.
 fn migrator(count: usize) -> Migrator {
     let migrations = files().into_iter().take(count).map(|file| {
         let name = file.file_stem().unwrap().to_string_lossy().into_owned();
         let (version, description) = name.split_once('_').unwrap();
-        let sql = AssertSqlSafe(std::fs::read_to_string(&file).unwrap());
+        let sql = fixed(std::fs::read_to_string(&file).unwrap());
         Migration::new(
             version.parse().unwrap(),
             description.replace('_', " ").into(),
@@ -123,7 +128,7 @@ fn write_earlier(file: &Path, count: usize, from: &Path) {
             .connect()
             .await
             .unwrap();
-        conn.execute(AssertSqlSafe(text)).await.unwrap();
+        conn.execute(fixed(text)).await.unwrap();
         conn.close().await.unwrap();
     });
 }
@@ -199,7 +204,7 @@ fn earlier_catalogues_of_a_server_do_so_too() {
         let text = inserts(&lab.file(), &columns, &store);
         block_on(async {
             let mut conn = options.connect().await.unwrap();
-            conn.execute(AssertSqlSafe(text)).await.unwrap();
+            conn.execute(fixed(text)).await.unwrap();
         });
         let address = Address::parse(server.url(&name).as_ref());
         let mut catalogue = Catalogue::open(address, Access::Write, WAIT).unwrap();

@@ -48,7 +48,9 @@ fn results(of: &SessionReader, rmse_mm: f64, variant: Option<&str>) -> String {
             "presses": {PRESSES},
             "scored": {{"rmse_mm": {{"value": {rmse_mm}, "low": 1.0, "high": 2.0, "n": 8}}}}}},
           "provenance": {{"session_id": "{session_id}", "content_sha256": "{content}", "results_hash": "abc", "variant": {variant}}},
-          "summary": {{}}, "valid": true}}"#
+          "summary": {{"session_id": "{session_id}", "content_sha256": "{content}", "analysis_version": 14, "results_hash": "abc",
+            "valid": true, "counts": {{}}, "rmse_mm": {{"value": {rmse_mm}, "low": 1.0, "high": 2.0, "n": 8}},
+            "repeat_std_mm": {{"n": 0}}, "located_rate": {{"n": 0}}}}, "valid": true}}"#
     )
 }
 

@@ -50,6 +50,7 @@ mod sample_size;
 mod selection;
 #[path = "../../../notify/tests/it/servers.rs"]
 mod servers;
+mod shelf;
 mod signing;
 mod special;
 mod starter;
