@@ -27,7 +27,7 @@ const TRIES: usize = 4;
 #[derive(Debug)]
 pub struct Catalogue {
     address: Address,
-    place: String,
+    pub(crate) place: String,
     pub(crate) runtime: Runtime,
     pub(crate) db: Db,
 }

@@ -50,7 +50,9 @@ impl Folder {
                     of.push((analysis.to_owned(), file.clone()));
                 };
                 add(&mut results, base, OFFICIAL);
-                if let Some((stem, variant)) = base.rsplit_once(ANALYSIS_MARK) {
+                if let Some((stem, variant)) = base.rsplit_once(ANALYSIS_MARK)
+                    && variant != OFFICIAL
+                {
                     add(&mut results, stem, variant);
                 }
             }
@@ -83,7 +85,8 @@ impl Folder {
         let results = self.analyses(session).iter().map(|(_, file)| file);
         let mut text = String::new();
         for path in [&file, &log, &tags].into_iter().chain(results) {
-            let Ok(found) = std::fs::symlink_metadata(path) else {
+            // Of a link, what it leads to counts.
+            let Ok(found) = std::fs::metadata(path) else {
                 continue;
             };
             let changed = found.modified().ok();
@@ -100,6 +103,19 @@ impl Folder {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn of_a_link_the_file_counts() {
+        let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let (name, file) = ("a.session.sqlite", other.path().join("file"));
+        std::fs::write(&file, "1").unwrap();
+        std::os::unix::fs::symlink(&file, folder.path().join(name)).unwrap();
+        let seen = || Folder::list(folder.path()).unwrap().fingerprint(name);
+        let before = seen();
+        std::fs::write(&file, "12").unwrap();
+        assert_ne!(seen(), before);
+    }
 
     #[test]
     fn a_change_beside_a_session_changes_its_fingerprint() {

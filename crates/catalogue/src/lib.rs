@@ -17,6 +17,7 @@ mod insert;
 mod listing;
 mod nights;
 mod open;
+mod press;
 mod prototypes;
 mod question;
 mod questions;
@@ -30,9 +31,10 @@ pub use address::{Address, CATALOGUE_FILE, ServerUrl};
 pub use catalogue::{Catalogue, Registration};
 pub use entry::{LegEntry, NoteEntry, SessionEntry};
 pub use error::CatalogueError;
-pub use listing::{ListedSession, OfficialResult};
+pub use listing::{ListedAnalysis, ListedSession, Listing};
 pub use nights::NightRegistration;
 pub use open::Access;
+pub use press::PressEntry;
 pub use question::{Answer, Parameter, ParameterKind, Question};
 
 pub use results::{

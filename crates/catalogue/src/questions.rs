@@ -64,6 +64,26 @@ const QUESTIONS: &[Question] = &[
     ),
     question!("press-faults", "Which faults cost presses?", [SINCE, UNTIL]),
     question!(
+        "failing-places",
+        "Which places of a prototype fail most often?",
+        [PROTOTYPE, LIMIT]
+    ),
+    question!(
+        "failure-causes",
+        "Why do presses of a prototype fail?",
+        [PROTOTYPE]
+    ),
+    question!(
+        "place-errors",
+        "How did the error at each place of a prototype change, by month?",
+        [PROTOTYPE, SINCE, UNTIL]
+    ),
+    question!(
+        "depth-errors",
+        "How does the error of a prototype depend on the depth?",
+        [PROTOTYPE]
+    ),
+    question!(
         "operators",
         "Who recorded how much, and which share of the presses is valid?",
         [SINCE, UNTIL]
@@ -189,7 +209,10 @@ mod tests {
         for question in QUESTIONS {
             let is_valid = question.sql.contains("is_valid = 1");
             assert!(
-                is_valid || !question.sql.contains("rmse_mm"),
+                is_valid
+                    || !["rmse_mm", " press "]
+                        .iter()
+                        .any(|of| question.sql.contains(of)),
                 "{}: numbers of an INVALID analysis are not to be read",
                 question.name
             );

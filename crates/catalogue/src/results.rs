@@ -1,10 +1,14 @@
 //! Analyses beside a session: their files, and what the catalogue takes from them.
 
+use std::collections::BTreeSet;
 use std::io::Read;
 use std::path::Path;
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use skinrig_recorder::SESSION_SUFFIX;
+
+use crate::press::{self, Press, PressEntry};
 
 /// Precedes the variant's name in its file names.
 pub const ANALYSIS_MARK: &str = ".analysis-";
@@ -56,6 +60,8 @@ pub struct AnalysisFigures {
     pub clocks: Vec<ClockEntry>,
     /// Calibration of the cameras.
     pub calibration: Option<CalibrationEntry>,
+    /// Its presses, by number; those of the official analysis are registered.
+    pub presses: Vec<PressEntry>,
 }
 
 /// An estimate with its 95 % interval.
@@ -108,8 +114,24 @@ struct Document {
     provenance: Provenance,
     /// Lists of many sessions read it; without it the results are those of an older version.
     #[serde(rename = "summary")]
-    _summary: serde::de::IgnoredAny,
+    _summary: Summary,
     valid: bool,
+}
+
+/// The part that a list of sessions shows. It does so for those alone that have all of it.
+#[derive(Deserialize)]
+#[expect(dead_code, reason = "only has to be there")]
+struct Summary {
+    session_id: String,
+    #[serde(default)]
+    content_sha256: Option<String>,
+    analysis_version: u32,
+    results_hash: String,
+    valid: bool,
+    counts: IgnoredAny,
+    rmse_mm: EstimateEntry,
+    repeat_std_mm: EstimateEntry,
+    located_rate: EstimateEntry,
 }
 
 #[derive(Deserialize)]
@@ -120,6 +142,8 @@ struct Analysis {
     #[serde(default)]
     calibration: Option<Calibration>,
     scored: Scored,
+    #[serde(default)]
+    presses: Vec<Press>,
 }
 
 #[derive(Deserialize, Default)]
@@ -211,6 +235,12 @@ pub(crate) fn read(
     }
 }
 
+/// True if no two names are the same.
+fn is_unique<'a>(mut names: impl Iterator<Item = &'a String>) -> bool {
+    let mut seen = BTreeSet::new();
+    names.all(|name| seen.insert(name))
+}
+
 fn figures(
     path: &Path,
     name: &str,
@@ -238,6 +268,12 @@ fn figures(
     let changed = found.provenance.variant.map(|v| v.changed);
     let analysis = found.analysis;
     let scored = analysis.scored;
+    let presses = press::entries(analysis.presses);
+    let maps = analysis.alignment.maps.iter().map(|clock| &clock.map);
+    let fitted = analysis.calibration.iter().flat_map(|fit| &fit.names);
+    let (Some(presses), true, true) = (presses, is_unique(maps), is_unique(fitted)) else {
+        return Err("the results list a press, a clock or a parameter twice, or an unknown cause: analyze the session again".to_owned());
+    };
     Ok(AnalysisFigures {
         version: analysis.version,
         results_hash: found.provenance.results_hash,
@@ -251,5 +287,6 @@ fn figures(
         located_rate: scored.located_rate.value,
         clocks: analysis.alignment.maps,
         calibration: analysis.calibration.map(CalibrationEntry::from),
+        presses,
     })
 }

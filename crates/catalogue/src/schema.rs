@@ -6,11 +6,18 @@ use sqlx::{Connection, SqlSafeStr};
 use crate::db::Db;
 
 /// All migrations, oldest first: version, description and SQL.
-const MIGRATIONS: [(i64, &str, &str); 1] = [(
-    20261127000000,
-    "catalogue",
-    include_str!("../../../migrations/catalogue/20261127000000_catalogue.sql"),
-)];
+const MIGRATIONS: [(i64, &str, &str); 2] = [
+    (
+        20261127000000,
+        "catalogue",
+        include_str!("../../../migrations/catalogue/20261127000000_catalogue.sql"),
+    ),
+    (
+        20261128000000,
+        "presses",
+        include_str!("../../../migrations/catalogue/20261128000000_presses.sql"),
+    ),
+];
 
 /// `skrc` in ASCII (`PRAGMA application_id`): distinguishes a catalogue from any other SQLite file.
 pub(crate) const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrc");

@@ -4,9 +4,9 @@ use skinrig_settings::Choice;
 
 use crate::db::Db;
 use crate::entry::SessionEntry;
-use crate::insert::{CLOCKS, DEVICES, PARAMETERS};
+use crate::insert::{self, CLOCKS, DEVICES, PARAMETERS};
 use crate::prototypes::{PrototypeOrigin, Relation};
-use crate::results::{AnalysisEntry, AnalysisFigures, ClockEntry};
+use crate::results::{AnalysisEntry, AnalysisFigures, ClockEntry, OFFICIAL};
 use crate::value::{Bound, Value};
 
 /// A session file as it was read.
@@ -178,7 +178,7 @@ async fn insert_session(db: &mut Db, entry: &SessionEntry) -> Result<(), sqlx::E
     let first = entry.legs.first();
     let last = entry.legs.last();
     let (presses, sync) = (entry.presses, entry.sync);
-    let values: [Bound; 31] = [
+    let values: [Bound; 35] = [
         (&line.session_id).into(),
         (&entry.content_sha256).into(),
         (&line.started_at).into(),
@@ -210,14 +210,18 @@ async fn insert_session(db: &mut Db, entry: &SessionEntry) -> Result<(), sqlx::E
         (&entry.tags_problem).into(),
         totals.map(|t| t.chunks).into(),
         totals.map(|t| t.pose_samples).into(),
+        sync.missed.into(),
+        sync.invalid.into(),
+        sync.excluded.into(),
+        totals.map(|t| t.trigger_edges).into(),
     ];
     db.execute(
         "INSERT INTO session (session_id, content_sha256, started_at, started_s, prototype, operator, protocol_name,
              protocol_sha256, plan_sha256, overrides_json, seed, rig_kind, rig_name, host, software, ended, duration_s, planned,
              valid, missed, invalid, excluded, sync_planned, sync_valid, raw_bytes, stored_bytes, lost_bytes, cd_events,
-             tags_problem, chunks, pose_samples)
+             tags_problem, chunks, pose_samples, sync_missed, sync_invalid, sync_excluded, trigger_edges)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22, $23, $24,
-             $25, $26, $27, $28, $29, $30, $31)",
+             $25, $26, $27, $28, $29, $30, $31, $32, $33, $34, $35)",
         &values,
     )
     .await
@@ -319,6 +323,9 @@ async fn analysis(db: &mut Db, id: &str, entry: &AnalysisEntry) -> Result<(), sq
         &values,
     )
     .await?;
+    if entry.name == OFFICIAL {
+        insert::presses(db, id, &figures.presses).await?;
+    }
     fits(db, id, &entry.name, figures).await
 }
 

@@ -52,6 +52,7 @@ mod schema;
 pub mod selection;
 mod sense;
 mod sessions;
+mod shelf;
 mod show;
 mod signals;
 mod signature;

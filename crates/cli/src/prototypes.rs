@@ -5,15 +5,14 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use skinrig_analysis::result::Estimate;
-use skinrig_catalogue::{EstimateEntry, ListedSession, OfficialResult};
-use skinrig_recorder::{SessionState, SessionSummary, list};
+use skinrig_recorder::{SessionState, SessionSummary};
 use skinrig_report::Variant;
 use skinrig_text::{Blocks, Column, Table, sparkline};
 
-use crate::analyses::{SummaryError, summary};
 use crate::args::PrototypesArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::sessions::{copies, originals};
+use crate::shelf::Shelf;
 
 /// Number of sessions in a sparkline, the latest ones.
 const SPARKS: usize = 16;
@@ -93,25 +92,17 @@ pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
 /// # Errors
 /// As [`prototypes`].
 pub(crate) fn document(folder: &Path) -> Result<serde_json::Value, Failure> {
-    let sessions = list(folder).map_err(Failure::session)?;
-    serde_json::to_value(group(read(&sessions, None))).map_err(Failure::internal)
+    let shelf = Shelf::read(folder)?;
+    serde_json::to_value(group(read(&shelf, None))).map_err(Failure::internal)
 }
 
-/// The sessions of a folder, oldest first: from its catalogue if that has all of them as they are, else from the files.
+/// The sessions of a folder, oldest first.
 fn entries(folder: &Path, analysis: Option<&str>) -> Result<Vec<Entry>, Failure> {
-    if analysis.is_none()
-        && let Some(listed) = crate::catalogue::automatic::list(folder)
-    {
-        return Ok(listed
-            .into_iter()
-            .map(|l| from_catalogue(folder, l))
-            .collect());
-    }
-    let sessions = list(folder).map_err(Failure::session)?;
-    for copy in copies(&sessions) {
+    let shelf = Shelf::told(folder)?;
+    for copy in copies(&shelf.sessions) {
         errln!("note: {copy}");
     }
-    Ok(read(&sessions, analysis))
+    Ok(read(&shelf, analysis))
 }
 
 /// RMSE of an analysis, or why it has none that can be used.
@@ -123,45 +114,8 @@ fn usable(is_valid: bool, rmse_mm: Estimate) -> (Option<Estimate>, Option<String
     }
 }
 
-fn from_catalogue(folder: &Path, listed: ListedSession) -> Entry {
-    let (rmse_mm, without) = match listed.official {
-        None => (None, Some(SummaryError::NotAnalysed.to_string())),
-        Some(OfficialResult { is_valid, rmse_mm }) => {
-            let EstimateEntry {
-                value,
-                low,
-                high,
-                n,
-            } = rmse_mm;
-            let rmse_mm = Estimate {
-                value,
-                low,
-                high,
-                n,
-            };
-            usable(is_valid, rmse_mm)
-        }
-    };
-    // Shown with the results alone.
-    let overrides = listed.official.map(|_| listed.overrides);
-    Entry {
-        prototype: listed.prototype,
-        protocol: listed.protocol_name,
-        rig_kind: listed.rig_kind,
-        point: Point {
-            session: folder.join(listed.file),
-            started_at: listed.started_at,
-            tags: listed.tags,
-            rmse_mm,
-            without,
-            variant: None,
-            overrides: overrides.unwrap_or_default(),
-        },
-    }
-}
-
 /// Reads the results of sessions, without copies of the same session; keeps their order.
-fn read(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Entry> {
+fn read(shelf: &Shelf, analysis: Option<&str>) -> Vec<Entry> {
     let entry = |session: &SessionSummary| {
         let SessionState::Readable {
             session_id,
@@ -175,9 +129,9 @@ fn read(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Entry> {
         else {
             return None;
         };
-        let found = summary(&session.path, session_id, analysis);
+        let found = shelf.result(&session.path, session_id, analysis);
         let (rmse_mm, without) = match &found {
-            Ok(found) => usable(found.valid, found.rmse_mm),
+            Ok(found) => usable(found.is_valid, found.rmse_mm),
             Err(why) => (None, Some(why.to_string())),
         };
         let (variant, overrides) =
@@ -197,7 +151,10 @@ fn read(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Entry> {
             },
         })
     };
-    originals(sessions).into_iter().filter_map(entry).collect()
+    originals(&shelf.sessions)
+        .into_iter()
+        .filter_map(entry)
+        .collect()
 }
 
 /// Groups sessions by prototype, then by protocol and kind of rig; keeps their order.

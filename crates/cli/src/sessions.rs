@@ -4,20 +4,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use skinrig_recorder::{
-    SESSION_SUFFIX, SessionReader, SessionState, SessionSummary, list, writer_of,
-};
+use skinrig_recorder::{SESSION_SUFFIX, SessionReader, SessionState, SessionSummary, writer_of};
 use skinrig_text::{Column, Table, cut};
 
 use crate::args::SessionsArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::shelf::Shelf;
 
 /// Lists the sessions of a folder.
 ///
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read.
 pub(crate) fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
-    let mut found = list(&args.folder).map_err(Failure::session)?;
+    let mut found = Shelf::told(&args.folder)?.sessions;
     if let Some(prototype_id) = &args.prototype {
         found.retain(|s| s.prototype() == Some(prototype_id));
     }
@@ -113,7 +112,7 @@ pub(crate) fn find_running(place: &Path) -> Result<PathBuf, Failure> {
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read; when it has none of them, with the prototypes that it has.
 pub(crate) fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf>, Failure> {
-    let all = list(folder).map_err(Failure::session)?;
+    let all = Shelf::read(folder)?.sessions;
     let of = |s: &&SessionSummary| s.prototype() == Some(prototype);
     let found: Vec<PathBuf> = all.iter().filter(of).map(|s| s.path.clone()).collect();
     if !found.is_empty() {

@@ -6,17 +6,20 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde_json::{Value, json};
 use skinrig_analysis::Analysis;
+use skinrig_catalogue::ListedAnalysis;
 use skinrig_controller::State;
 use skinrig_hil::history::{self, Filter};
+use skinrig_recorder::{SessionState, SessionSummary};
 use skinrig_view::{
     AnalysisEntry, Lab, LabError, NewestBytes, Options, RunState, Server, SettingDifference,
-    SettingValues,
+    SettingValues, ShelfSession,
 };
 
 use crate::args::ViewArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::remote::{NewestEvents, Reply, Request, RunRequest, ask};
 use crate::rig::gates;
+use crate::shelf::{Shelf, estimate};
 use crate::{analyses, compare, control, paths, prototypes, sessions};
 
 /// Serves a folder of sessions until ctrl-C.
@@ -25,6 +28,8 @@ use crate::{analyses, compare, control, paths, prototypes, sessions};
 /// [`Failure::input`] for what is neither a session nor a folder, or for an address that cannot be opened.
 pub(crate) fn view(args: &ViewArgs, json: bool) -> Outcome {
     let (folder, first) = place(&args.session)?;
+    // Once: the page lists the folder again and again.
+    Shelf::told(&folder)?;
     let options = Options {
         folder,
         first,
@@ -76,6 +81,18 @@ fn lab_error(failure: Failure) -> LabError {
     let message = failure.message;
     let plain = message.strip_prefix("error: ").map(str::to_owned);
     LabError(plain.unwrap_or(message))
+}
+
+/// An analysis as the catalogue has it.
+fn listed_entry(listed: &ListedAnalysis) -> AnalysisEntry {
+    let rmse = estimate(listed);
+    AnalysisEntry {
+        name: listed.variant.clone(),
+        rmse_mm: Some([rmse.value, rmse.low, rmse.high]),
+        is_valid: listed.is_valid,
+        changes: listed.changed.clone(),
+        trouble: None,
+    }
 }
 
 impl Lab for Program {
@@ -154,6 +171,24 @@ impl Lab for Program {
             },
         };
         all.map(entry).collect()
+    }
+
+    fn shelf(&self, folder: &Path) -> Result<Vec<ShelfSession>, LabError> {
+        let shelf = Shelf::read(folder).map_err(lab_error)?;
+        let session = |summary: &SessionSummary| {
+            let analyses = match &summary.state {
+                SessionState::Readable { session_id, .. } => match shelf.analyses(&summary.path) {
+                    Some(listed) => listed.into_iter().map(listed_entry).collect(),
+                    None => self.analyses(&summary.path, session_id),
+                },
+                SessionState::Empty | SessionState::Broken { .. } => Vec::new(),
+            };
+            ShelfSession {
+                summary: summary.clone(),
+                analyses,
+            }
+        };
+        Ok(shelf.sessions.iter().map(session).collect())
     }
 
     fn differences(

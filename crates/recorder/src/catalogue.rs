@@ -77,6 +77,17 @@ pub enum SessionState {
 /// # Errors
 /// [`RecorderError::Io`] when the folder cannot be read. A broken file is an entry, not an error.
 pub fn list(folder: impl AsRef<Path>) -> Result<Vec<SessionSummary>, RecorderError> {
+    list_with(folder, |_| None)
+}
+
+/// As [`list`], without opening the files whose content is `known`.
+///
+/// # Errors
+/// As [`list`].
+pub fn list_with(
+    folder: impl AsRef<Path>,
+    known: impl Fn(&Path) -> Option<SessionState>,
+) -> Result<Vec<SessionSummary>, RecorderError> {
     let folder = folder.as_ref();
     let io = |source| RecorderError::Io {
         path: folder.to_owned(),
@@ -91,12 +102,15 @@ pub fn list(folder: impl AsRef<Path>) -> Result<Vec<SessionSummary>, RecorderErr
             .is_some_and(|n| n.to_string_lossy().ends_with(SESSION_SUFFIX));
         if named {
             let size_bytes = std::fs::metadata(&path).map_or(0, |m| m.len());
-            let state = summarise(&path).unwrap_or_else(|e| match e {
-                RecorderError::Empty { .. } => SessionState::Empty,
-                e => SessionState::Broken {
-                    reason: e.to_string(),
-                },
-            });
+            let read = || {
+                summarise(&path).unwrap_or_else(|e| match e {
+                    RecorderError::Empty { .. } => SessionState::Empty,
+                    e => SessionState::Broken {
+                        reason: e.to_string(),
+                    },
+                })
+            };
+            let state = known(&path).unwrap_or_else(read);
             sessions.push(SessionSummary {
                 path,
                 size_bytes,

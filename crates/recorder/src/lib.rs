@@ -53,7 +53,7 @@ mod totals;
 mod touch;
 mod worker;
 
-pub use catalogue::{SessionState, SessionSummary, list};
+pub use catalogue::{SessionState, SessionSummary, list, list_with};
 pub use close_result::SealedSession;
 pub use error::{CopyError, RecorderError, RescueError, WriteFailure};
 pub use lock::writer_of;

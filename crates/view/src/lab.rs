@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::Value;
 use skinrig_analysis::Analysis;
+use skinrig_recorder::SessionSummary;
 
 /// Why the lab cannot answer, as a complete message with a next step.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -46,6 +47,15 @@ pub struct AnalysisEntry {
     pub changes: Vec<String>,
     /// Why the results cannot be used.
     pub trouble: Option<String>,
+}
+
+/// A session of a folder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShelfSession {
+    /// The session.
+    pub summary: SessionSummary,
+    /// Its analyses, the official one first; none of an unreadable file.
+    pub analyses: Vec<AnalysisEntry>,
 }
 
 /// A setting in which two analyses differ.
@@ -99,6 +109,12 @@ pub trait Lab: Send + Sync + 'static {
 
     /// All analyses beside `session`, the official one first.
     fn analyses(&self, session: &Path, session_id: &str) -> Vec<AnalysisEntry>;
+
+    /// The sessions of a folder with all of their analyses, oldest first.
+    ///
+    /// # Errors
+    /// [`LabError`] if the folder cannot be read.
+    fn shelf(&self, folder: &Path) -> Result<Vec<ShelfSession>, LabError>;
 
     /// Settings in which two sessions differ, most severe first, and the number of settings. Each session comes with the name of a variant;
     /// `None` is the official analysis. Settings of the analysis are left out unless both are analysed.

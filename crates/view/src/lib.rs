@@ -30,5 +30,6 @@ mod shelf;
 
 pub use lab::{
     AnalysisEntry, Lab, LabError, NewestBytes, RunState, SettingDifference, SettingValues,
+    ShelfSession,
 };
 pub use server::{Options, ServeError, Server};

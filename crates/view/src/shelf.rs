@@ -1,16 +1,15 @@
 //! Owns the answer with everything on the lab's shelf: sessions, prototypes, nights.
 
 use serde_json::{Value, json};
-use skinrig_recorder::{SessionState, SessionSummary, list, writer_of};
+use skinrig_recorder::writer_of;
 
 use crate::folder::{Folder, name_of};
-use crate::lab::Lab;
+use crate::lab::{Lab, ShelfSession};
 use crate::problem::Problem;
 
 /// The sessions of the folder with their analyses, the prototypes and the nights.
 pub(crate) fn document(lab: &dyn Lab, folder: &Folder) -> Result<Value, Problem> {
-    let sessions = list(folder.path())?;
-    let rows: Vec<Value> = sessions.iter().map(|s| row(lab, s)).collect();
+    let rows: Vec<Value> = lab.shelf(folder.path())?.iter().map(row).collect();
     // A part that cannot be read says so in its place; the others are shown.
     let part = |found: Result<Value, crate::lab::LabError>| match found {
         Ok(value) => value,
@@ -24,11 +23,12 @@ pub(crate) fn document(lab: &dyn Lab, folder: &Folder) -> Result<Value, Problem>
     }))
 }
 
-fn row(lab: &dyn Lab, session: &SessionSummary) -> Value {
-    let analyses = match &session.state {
-        SessionState::Readable { session_id, .. } => lab.analyses(&session.path, session_id),
-        SessionState::Empty | SessionState::Broken { .. } => Vec::new(),
-    };
+fn row(
+    ShelfSession {
+        summary: session,
+        analyses,
+    }: &ShelfSession,
+) -> Value {
     let mut row = json!({
         "name": name_of(&session.path),
         "size_bytes": session.size_bytes,

@@ -6,8 +6,10 @@
 mod common;
 mod files;
 mod kills;
+mod migrations;
 #[cfg(unix)]
 mod postgres;
+mod presses;
 mod questions;
 #[cfg(unix)]
 mod server;

@@ -59,7 +59,7 @@ pub(crate) fn fill(
     sessions.into_iter().map(|(_, session)| session).collect()
 }
 
-fn real(value: &Value) -> f64 {
+pub(crate) fn real(value: &Value) -> f64 {
     match value {
         Value::Real(value) => *value,
         other => panic!("expected a number, found {other:?}"),
@@ -75,18 +75,18 @@ pub(crate) fn is_equal(one: &[Value], other: &[Value]) -> bool {
     one.len() == other.len() && one.iter().zip(other).all(equal)
 }
 
-fn text(value: &Value) -> &str {
+pub(crate) fn text(value: &Value) -> &str {
     value.as_text().unwrap()
 }
 
 /// Official, usable RMSE of a session.
-fn rmse(session: &SessionEntry) -> Option<f64> {
+pub(crate) fn rmse(session: &SessionEntry) -> Option<f64> {
     let official = session.analyses.iter().find(|a| a.name == "official")?;
     let figures = official.figures.as_ref().ok().filter(|f| f.is_valid)?;
     figures.rmse_mm.value
 }
 
-fn mean(values: &[f64]) -> f64 {
+pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 

@@ -18,6 +18,19 @@ fn refresh(lab: &Lab) -> Registration {
     lab.open().refresh(lab.path(), false).unwrap()
 }
 
+/// Presses of an analysis, as far as the catalogue reads them.
+const PRESSES: &str = r#"[
+    {"press": 1, "role": "sync", "repetition": 1, "location": 1, "planned": {"x_mm": 10.0, "y_mm": 2.0}, "depth_mm": 2.0,
+     "truth": null, "verdict": "missed", "cause": {"missed": "never_attempted"}, "location_outcome": {"status": "missing"}},
+    {"press": 2, "role": "score", "repetition": 1, "location": 2, "planned": {"x_mm": -5.0, "y_mm": 2.0}, "depth_mm": 1.5,
+     "truth": {"x_mm": -5.25, "y_mm": 2.5}, "verdict": "valid", "cause": null,
+     "location_outcome": {"status": "located", "at": {"x_mm": -2.25, "y_mm": 6.5}, "sine": 0.9},
+     "region": {"semi_axes_mm": [3.0, 2.0], "angle_deg": -45.0}},
+    {"press": 4, "role": "calibrate", "repetition": 2, "location": 3, "planned": {"x_mm": 0.0, "y_mm": 0.0}, "depth_mm": 2.0,
+     "truth": {"x_mm": 0.0, "y_mm": 0.0}, "verdict": "excluded",
+     "cause": {"no_response": {"camera": "camera2", "found": 1, "expected": 2.0, "standard_error": 1.0}},
+     "location_outcome": {"status": "missing"}, "region": null}]"#;
+
 /// Results of an analysis with an RMSE, as far as the catalogue reads them.
 fn results(of: &SessionReader, rmse_mm: f64, variant: Option<&str>) -> String {
     let session_id = of.session_id().unwrap();
@@ -32,10 +45,34 @@ fn results(of: &SessionReader, rmse_mm: f64, variant: Option<&str>) -> String {
                 "residual_max_us": 0.7, "n": 38, "pieces": 1}}]}},
             "calibration": {{"model": "yaw", "names": ["yaw_1", "yaw_2"], "values": [0.5, 0.25],
                 "standard_errors": [null, 0.1], "rmse_before_mm": 4.0, "rmse_after_mm": 2.0, "n": 9}},
+            "presses": {PRESSES},
             "scored": {{"rmse_mm": {{"value": {rmse_mm}, "low": 1.0, "high": 2.0, "n": 8}}}}}},
           "provenance": {{"session_id": "{session_id}", "content_sha256": "{content}", "results_hash": "abc", "variant": {variant}}},
-          "summary": {{}}, "valid": true}}"#
+          "summary": {{"session_id": "{session_id}", "content_sha256": "{content}", "analysis_version": 14, "results_hash": "abc",
+            "valid": true, "counts": {{}}, "rmse_mm": {{"value": {rmse_mm}, "low": 1.0, "high": 2.0, "n": 8}},
+            "repeat_std_mm": {{"n": 0}}, "located_rate": {{"n": 0}}}}, "valid": true}}"#
     )
+}
+
+/// Writes official results of the session `n`.
+pub(crate) fn write_results(lab: &Lab, n: u32) {
+    let reader = SessionReader::open(lab.session(n)).unwrap();
+    let file = lab.path().join(format!("{n}.results.json"));
+    std::fs::write(file, results(&reader, 1.5, None)).unwrap();
+}
+
+/// Adds a tag and a note to the session `n`.
+pub(crate) fn add_tag(lab: &Lab, n: u32) {
+    let reader = SessionReader::open(lab.session(n)).unwrap();
+    let added = Annotation {
+        session_id: reader.session_id().unwrap(),
+        at: "2026-11-21T00:00:00Z".into(),
+        by: "Ann".into(),
+        add: vec!["wet".into()],
+        remove: Vec::new(),
+        note: Some("lamp".into()),
+    };
+    annotate(&lab.session(n), &added).unwrap();
 }
 
 #[test]
@@ -43,25 +80,10 @@ fn a_session_is_registered_as_it_is_in_its_file_and_once() {
     let lab = Lab::with_sessions(2);
     let reader = SessionReader::open(lab.session(1)).unwrap();
     let id = reader.session_id().unwrap();
-    std::fs::write(
-        lab.path().join("1.results.json"),
-        results(&reader, 1.5, None),
-    )
-    .unwrap();
+    write_results(&lab, 1);
     let variant = lab.path().join("1.analysis-bin=2px.results.json");
     std::fs::write(variant, results(&reader, 1.25, Some("bin=2px"))).unwrap();
-    annotate(
-        &lab.session(1),
-        &Annotation {
-            session_id: id.clone(),
-            at: "2026-11-21T00:00:00Z".into(),
-            by: "Ann".into(),
-            add: vec!["wet".into()],
-            remove: Vec::new(),
-            note: Some("lamp".into()),
-        },
-    )
-    .unwrap();
+    add_tag(&lab, 1);
 
     let done = lab.open().register(&[lab.session(1)]).unwrap();
     assert_eq!(done.registered, ["1.session.sqlite"]);
@@ -116,6 +138,26 @@ fn a_session_is_registered_as_it_is_in_its_file_and_once() {
         assert_eq!(column(&lab.file(), sql), [expected], "{sql}");
     }
 
+    // Presses of the official analysis alone.
+    let expected = [
+        "press=1|role=sync|location=1|repetition=1|planned_x_mm=10|planned_y_mm=2|planned_depth_mm=2|measured_x_mm=null|\
+         measured_y_mm=null|verdict=missed|cause=missed|camera=null|estimate_x_mm=null|estimate_y_mm=null|error_mm=null|\
+         region_major_mm=null|region_minor_mm=null|region_angle_deg=null",
+        "press=2|role=score|location=2|repetition=1|planned_x_mm=-5|planned_y_mm=2|planned_depth_mm=1.5|measured_x_mm=-5.25|\
+         measured_y_mm=2.5|verdict=valid|cause=null|camera=null|estimate_x_mm=-2.25|estimate_y_mm=6.5|error_mm=5|\
+         region_major_mm=3|region_minor_mm=2|region_angle_deg=-45",
+        "press=4|role=calibrate|location=3|repetition=2|planned_x_mm=0|planned_y_mm=0|planned_depth_mm=2|measured_x_mm=0|\
+         measured_y_mm=0|verdict=excluded|cause=no_response|camera=camera2|estimate_x_mm=null|estimate_y_mm=null|error_mm=null|\
+         region_major_mm=null|region_minor_mm=null|region_angle_deg=null",
+    ];
+    let found = rows(
+        &lab.file(),
+        "SELECT press, role, location, repetition, planned_x_mm, planned_y_mm, planned_depth_mm, measured_x_mm, measured_y_mm,
+             verdict, cause, camera, estimate_x_mm, estimate_y_mm, error_mm, region_major_mm, region_minor_mm, region_angle_deg
+         FROM press ORDER BY press",
+    );
+    assert_eq!(found, expected);
+
     // Again, by another program, and as part of the folder: the same rows.
     let before = lab.dump();
     let again = lab.open().register(&[lab.session(1)]).unwrap();
@@ -150,6 +192,60 @@ fn results_of_an_earlier_content_are_a_problem() {
     let sql = "SELECT rmse_mm, problem FROM analysis";
     let expected = "rmse_mm=null|problem=the results are older than the session: analyze it again";
     assert_eq!(rows(&lab.file(), sql), [expected]);
+    assert_eq!(column(&lab.file(), "SELECT count(*) FROM press"), ["0"]);
+    // Once it is analyzed, they are those of the new content; once they are stale again, none.
+    for (text, count) in [
+        (results(&reader, 1.5, None), "3"),
+        (
+            results(&reader, 1.5, None).replace(&content, &"1".repeat(64)),
+            "0",
+        ),
+    ] {
+        std::fs::write(lab.path().join("0.results.json"), text).unwrap();
+        assert_eq!(refresh(&lab).registered.len(), 1);
+        assert_eq!(column(&lab.file(), "SELECT count(*) FROM press"), [count]);
+    }
+}
+
+/// Results that contradict themselves are a problem of their session alone: the others are registered.
+#[test]
+fn results_with_rows_twice_are_a_problem() {
+    let lab = Lab::with_sessions(2);
+    let reader = SessionReader::open(lab.session(0)).unwrap();
+    let good = results(&reader, 1.5, None);
+    let problem = "SELECT problem FROM analysis WHERE name = 'official'";
+    for (one, other) in [
+        (r#""press": 4"#, r#""press": 2"#),
+        (r#""press": 4"#, r#""press": 1"#),
+        (r#""no_response": {"#, r#""No response": {"#),
+        (
+            r#""names": ["yaw_1", "yaw_2"]"#,
+            r#""names": ["yaw_1", "yaw_1"]"#,
+        ),
+        (
+            r#""pieces": 1}"#,
+            r#""pieces": 1}, {"map": "camera1_from_box", "n": 2}"#,
+        ),
+    ] {
+        let bad = good.replace(one, other);
+        assert_ne!(bad, good);
+        std::fs::write(lab.path().join("0.results.json"), bad).unwrap();
+        let done = lab.open().refresh(lab.path(), true).unwrap();
+        assert_eq!(
+            (done.registered.len(), done.unreadable.len()),
+            (2, 0),
+            "{other}"
+        );
+        assert_eq!(column(&lab.file(), problem).len(), 1, "{other}");
+        assert_ne!(column(&lab.file(), problem), ["null"], "{other}");
+        assert_eq!(column(&lab.file(), "SELECT count(*) FROM press"), ["0"]);
+    }
+    // A file whose name pretends to be a variant called `official`.
+    std::fs::write(lab.path().join("0.results.json"), &good).unwrap();
+    std::fs::write(lab.path().join("0.analysis-official.results.json"), &good).unwrap();
+    let done = lab.open().refresh(lab.path(), false).unwrap();
+    assert_eq!(done.registered.len(), 1);
+    assert_eq!(column(&lab.file(), problem), ["null"]);
 }
 
 #[test]

@@ -51,7 +51,7 @@ impl Lab {
 }
 
 /// All tables of a catalogue but that of the migrations.
-pub(crate) const TABLES: [&str; 15] = [
+pub(crate) const TABLES: [&str; 16] = [
     "SELECT * FROM session",
     "SELECT * FROM session_file",
     "SELECT * FROM unreadable_file",
@@ -62,6 +62,7 @@ pub(crate) const TABLES: [&str; 15] = [
     "SELECT * FROM clock_fit",
     "SELECT * FROM calibration",
     "SELECT * FROM calibration_value",
+    "SELECT * FROM press",
     "SELECT * FROM tag",
     "SELECT * FROM note",
     "SELECT * FROM night",

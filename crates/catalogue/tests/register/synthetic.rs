@@ -8,8 +8,9 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use skinrig_catalogue::{
     AnalysisEntry, AnalysisFigures, CalibrationEntry, ClockEntry, EstimateEntry, LegEntry,
-    NoteEntry, SessionEntry,
+    NoteEntry, PressEntry, SessionEntry,
 };
+use skinrig_model::{CameraId, PressRole, Verdict as PressVerdict};
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, Part, Versions};
 use skinrig_nightly::{Night, NightExit, Verdict};
 use skinrig_recorder::{Headline, PressTally, SessionTotals};
@@ -84,7 +85,7 @@ impl SyntheticLab {
         let kinds = ["data_lost", "late", "hold", "surface"];
         let kind = kinds[self.below(4) as usize].to_owned();
         let tags = ["wet", "good-skin", "paper", "drift"];
-        let analyses = self.analyses(prototype as f64, bench as f64);
+        let analyses = self.analyses(prototype as f64, bench as f64, planned);
         SessionEntry {
             headline: Headline {
                 session_id: self.hex(32),
@@ -136,7 +137,7 @@ impl SyntheticLab {
         roles.into_iter().map(device).collect()
     }
 
-    fn analyses(&mut self, prototype: f64, bench: f64) -> Vec<AnalysisEntry> {
+    fn analyses(&mut self, prototype: f64, bench: f64, planned: u64) -> Vec<AnalysisEntry> {
         let rmse = 1.0 + prototype / 100.0 + self.unit();
         let entry = |name: &str, figures| AnalysisEntry {
             name: name.to_owned(),
@@ -144,7 +145,9 @@ impl SyntheticLab {
         };
         let mut all = Vec::new();
         if self.is(90) {
-            all.push(entry("official", Ok(self.figures(rmse, bench))));
+            let mut figures = self.figures(rmse, bench);
+            figures.presses = (0..planned as u32).map(|n| self.press(n)).collect();
+            all.push(entry("official", Ok(figures)));
         } else if self.is(20) {
             all.push(entry(
                 "official",
@@ -156,6 +159,50 @@ impl SyntheticLab {
             all.push(entry("locator=direct", Ok(self.figures(rmse, bench))));
         }
         all
+    }
+
+    /// Press `n` of repeated presses at 50 places and two depths; some fail.
+    fn press(&mut self, n: u32) -> PressEntry {
+        let place = n % 50;
+        let (x, y) = (f64::from(place % 10) * 5.0, f64::from(place / 10) * 5.0);
+        let camera = self.is(50).then_some(CameraId::Two);
+        let fails = if place < 5 { 20 } else { 1 };
+        let (verdict, cause, camera) = match self.below(100) {
+            n if n < fails => {
+                let camera = camera.or(Some(CameraId::One));
+                (PressVerdict::Excluded, Some("no_response"), camera)
+            }
+            97 => (PressVerdict::Excluded, Some("by_hand"), None),
+            98 => (PressVerdict::Invalid, Some("invalid"), None),
+            99 => (PressVerdict::Missed, Some("missed"), None),
+            _ => (PressVerdict::Valid, None, None),
+        };
+        let error = [self.unit(), self.unit()];
+        let is_seen = verdict == PressVerdict::Valid;
+        PressEntry {
+            press: n + 1,
+            role: match place {
+                0 => PressRole::Sync,
+                n if n % 5 == 0 => PressRole::Calibrate,
+                _ => PressRole::Score,
+            },
+            location: place + 1,
+            repetition: n / 50 + 1,
+            planned_x_mm: x,
+            planned_y_mm: y,
+            planned_depth_mm: f64::from(1 + n % 2),
+            measured_x_mm: Some(x + 0.01),
+            measured_y_mm: Some(y),
+            verdict,
+            cause: cause.map(str::to_owned),
+            camera,
+            estimate_x_mm: is_seen.then_some(x + 0.01 + error[0]),
+            estimate_y_mm: is_seen.then_some(y + error[1]),
+            error_mm: is_seen.then(|| error[0].hypot(error[1])),
+            region_major_mm: is_seen.then_some(3.0),
+            region_minor_mm: is_seen.then_some(2.0),
+            region_angle_deg: is_seen.then_some(-45.0),
+        }
     }
 
     fn figures(&mut self, rmse: f64, bench: f64) -> AnalysisFigures {

@@ -1,16 +1,16 @@
 //! Registers a session that a command has just recorded, analysed or tagged. Best effort: the command never fails because of the
-//! catalogue, and waits at most [`WAIT`], when the robot is at rest. Lists a folder from its catalogue.
+//! catalogue, and waits at most [`WAIT`], when the robot is at rest.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError, ListedSession};
+use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError};
 
 use crate::paths::folder_of;
 
 /// Longest wait for another program that writes the catalogue, such as a second run that ends at the same moment.
-const WAIT: Duration = Duration::from_millis(200);
+pub(crate) const WAIT: Duration = Duration::from_millis(200);
 
 /// Registers `session` in the embedded catalogue of its folder; says so if that fails. The session is then stale, until
 /// `skinrig catalogue register` or the next command that changes it.
@@ -53,14 +53,4 @@ fn try_register(session: &Path) -> Result<(), CatalogueError> {
     // A session that cannot be read is an entry, too.
     catalogue.register(&[session.to_owned()])?;
     catalogue.close()
-}
-
-/// The sessions of a folder from its embedded catalogue; `None` if only the files have the whole answer.
-pub(crate) fn list(folder: &Path) -> Option<Vec<ListedSession>> {
-    let address = Address::of_folder(folder);
-    let mut catalogue = Catalogue::open(address, Access::Read, WAIT).ok()?;
-    let listed = catalogue.list(folder).ok()?;
-    // What was read does not depend on it.
-    let _ = catalogue.close();
-    listed
 }

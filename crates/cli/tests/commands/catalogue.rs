@@ -133,6 +133,7 @@ fn the_catalogue_has_the_same_answers(s: &str, prototypes: &Value) {
         best[0]["best_rmse_mm"],
         prototypes[1]["series"][0]["best"]["value"]
     );
+    the_presses_are_those_of_the_results(&ask, points);
     assert_eq!(ask(&["tagged", "tag=good-skin"]).len(), 1);
     assert_eq!(
         ask(&["notes", "text=lamp"])[0]["text"],
@@ -175,6 +176,37 @@ fn the_catalogue_has_the_same_answers(s: &str, prototypes: &Value) {
         .code(0)
         .out;
     assert!(words.contains("sim-00000001-c1"), "{words}");
+}
+
+/// Number and mean error of the presses that count, and number of those that failed.
+fn the_presses_are_those_of_the_results(ask: &dyn Fn(&[&str]) -> Vec<Value>, points: &[Value]) {
+    let (mut errors, mut failed) = (Vec::new(), 0);
+    for point in points {
+        let results = point["session"].as_str().unwrap();
+        let results = results.replace(".session.sqlite", ".results.json");
+        let results = crate::support::read_json(results.as_ref());
+        for press in results["analysis"]["presses"].as_array().unwrap() {
+            let is_valid = press["verdict"] == "valid";
+            failed += u64::from(!is_valid && press["role"] != "sync");
+            if is_valid && press["role"] == "score" {
+                let of = |at: &Value, axis: &str| at[axis].as_f64().unwrap();
+                let off =
+                    |axis| of(&press["location_outcome"]["at"], axis) - of(&press["truth"], axis);
+                errors.push(off("x_mm").hypot(off("y_mm")));
+            }
+        }
+    }
+    let of = |question: &str| ask(&[question, "prototype=test skin"]);
+    let depths = of("depth-errors");
+    let sum =
+        |rows: &[Value], key: &str| -> u64 { rows.iter().map(|r| r[key].as_u64().unwrap()).sum() };
+    assert_eq!(sum(&depths, "presses"), errors.len() as u64);
+    let weighted =
+        |r: &Value| r["mean_error_mm"].as_f64().unwrap() * r["presses"].as_f64().unwrap();
+    let total: f64 = depths.iter().map(weighted).sum();
+    assert!((total - errors.iter().sum::<f64>()).abs() < 1e-9);
+    assert_eq!(sum(&of("failure-causes"), "presses"), failed);
+    assert!(!errors.is_empty());
 }
 
 /// Executes a statement on a database.

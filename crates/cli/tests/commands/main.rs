@@ -51,6 +51,7 @@ mod scene;
 mod selection;
 #[path = "../../../notify/tests/it/servers.rs"]
 mod servers;
+mod shelf;
 mod signing;
 mod special;
 mod starter;

@@ -20,6 +20,7 @@ use skinrig_model::{
 use skinrig_recorder::{SessionReader, SessionWriter};
 use skinrig_view::{
     AnalysisEntry, Lab, LabError, NewestBytes, Options, RunState, Server, SettingDifference,
+    ShelfSession,
 };
 
 /// Pages that are open at the same time.
@@ -75,6 +76,10 @@ impl Lab for Run {
 
     fn analyses(&self, session: &Path, id: &str) -> Vec<AnalysisEntry> {
         Program.analyses(session, id)
+    }
+
+    fn shelf(&self, folder: &Path) -> Result<Vec<ShelfSession>, LabError> {
+        Program.shelf(folder)
     }
 
     fn differences(
