@@ -1,6 +1,7 @@
 //! How well touches were felt: delays after measured contacts, and false alarms in the time between presses.
 
 use skinrig_analysis::Analysis;
+use skinrig_analysis::exclusion::Exclusion;
 use skinrig_model::{HostTime, PressRole, Verdict};
 use skinrig_statistics::distributions::poisson_interval;
 
@@ -26,7 +27,7 @@ pub struct ScoredPress {
 
 impl ScoredPress {
     /// The scored presses of an analysis that were carried out and follow another press; also those excluded for what the cameras saw:
-    /// a press that was carried out and not felt is missed.
+    /// a press that was carried out and not felt is missed. Those that a selection excludes are left out.
     #[must_use]
     pub fn of(analysis: &Analysis) -> Vec<Self> {
         let us = |t: HostTime| t.0 as f64 * 1e-3;
@@ -40,6 +41,7 @@ impl ScoredPress {
         let pairs = timed.windows(2).map(|pair| (pair[0].2, pair[1]));
         pairs
             .filter(|(_, (_, p, _))| p.role == PressRole::Score && is_carried_out(p.verdict))
+            .filter(|(_, (_, p, _))| !matches!(p.cause, Some(Exclusion::BySelection(_))))
             .map(|(before, (row, _, timing))| Self {
                 row,
                 contact_us: us(timing.contact),

@@ -42,7 +42,7 @@ pub(crate) enum ChallengeCommand {
 /// Arguments of `challenge make`.
 #[derive(Debug, Args)]
 pub(crate) struct MakeArgs {
-    /// The session file.
+    /// The session file, or a selection of one session.
     pub session: PathBuf,
 
     /// Folder to give away.
@@ -75,7 +75,7 @@ pub(crate) struct ScoreArgs {
 /// Arguments of `challenge run`.
 #[derive(Debug, Args)]
 pub(crate) struct ExamineArgs {
-    /// The session file.
+    /// The session file, or a selection of one session.
     pub session: PathBuf,
 
     /// Send the events of every press, too.

@@ -153,7 +153,7 @@ pub(crate) struct TradeoffArgs {
 /// Arguments of `online`.
 #[derive(Debug, Args)]
 pub(crate) struct OnlineArgs {
-    /// The session file.
+    /// The session file, or a selection of one session.
     pub session: PathBuf,
 
     /// Speed of the replay relative to the recording: a factor, or `max`.

@@ -9,7 +9,7 @@ use std::time::Duration;
 use skinrig_analysis::result::Estimate;
 use skinrig_export::Source;
 use skinrig_export::challenge::{
-    self, ChallengeError, ChallengeOptions, Examination, Judgement, Timeouts,
+    self, ChallengeError, ChallengeOptions, ChallengeSelection, Examination, Judgement, Timeouts,
 };
 use skinrig_model::{CameraId, CdEvent, RunHeader};
 use skinrig_recorder::{RecorderError, SessionReader};
@@ -21,7 +21,9 @@ use crate::args::{ChallengeArgs, ChallengeCommand, ExamineArgs, MakeArgs, ScoreA
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export::refused;
 use crate::paths::beside;
-use crate::results;
+use crate::results::{self, Results};
+use crate::selection::result::SelectedResult;
+use crate::selection::{self, Target};
 
 /// Makes or scores a challenge.
 ///
@@ -85,27 +87,56 @@ fn salt() -> Result<[u8; 32], Failure> {
     Ok(salt)
 }
 
+/// The session of an argument, analysed; what its selection changes.
+fn analyzed(argument: &Path) -> Result<(Target, Results, Option<SelectedResult>), Failure> {
+    let target = selection::sessions(argument)?.one(argument)?;
+    let choices = AnalysisRequest {
+        selection: target.selected.as_ref(),
+        ..AnalysisRequest::default()
+    };
+    let results = results::analyze_shown(&target.path, choices)?;
+    let selected = target.selected.as_ref();
+    let stated = selected.map(|selected| SelectedResult::of(&results, selected));
+    Ok((target, results, stated))
+}
+
+/// Prints a document, with what a selection changes.
+fn print_document(mut document: serde_json::Value, selected: Option<&SelectedResult>) {
+    if let Some(selected) = selected {
+        document["selection"] = selected.document();
+    }
+    crate::terminal::print_json(&document);
+}
+
 fn make(args: &MakeArgs, json: bool) -> Outcome {
-    let results = results::analyze_shown(&args.session, AnalysisRequest::default())?;
-    let file = EventFile::open(&args.session)?;
+    let (target, results, selected) = analyzed(&args.session)?;
+    let file = EventFile::open(&target.path)?;
     let mut events = |camera, interval| file.events(camera, interval);
     let source = Source {
         reader: &file.reader,
         header: &file.header,
         analysis: Some((&results.analysis, &results.legs)),
     };
-    let default: PathBuf = beside(&args.session, ".answers.json");
+    let own = target.selected.as_ref();
+    let label = own.map_or(String::new(), |own| format!(".{}", own.label()));
+    let default: PathBuf = beside(&target.path, &format!("{label}.answers.json"));
     let answers = args.answers.as_ref().unwrap_or(&default);
     let making = ChallengeOptions {
         overwrite: args.overwrite,
         origin: Origin::of(&file.header).map(Origin::name),
+        selection: own.map(|own| ChallengeSelection {
+            name: own.name.name.clone(),
+            sha256: own.name.sha256.clone(),
+            excluded: own.out.len() as u32,
+        }),
         salt: salt()?,
     };
     let challenge_files =
         challenge::make(&source, &args.out, answers, &making, &mut events).map_err(failure)?;
     if json {
-        crate::terminal::print_json(&serde_json::json!(challenge_files));
+        print_document(serde_json::json!(challenge_files), selected.as_ref());
     } else {
+        print_selected(selected.as_ref());
         for path in &challenge_files.files {
             outln!("{}", path.display());
         }
@@ -136,9 +167,16 @@ fn score(args: &ScoreArgs, json: bool) -> Outcome {
 const PRESS: Duration = Duration::from_secs(10);
 const FIT_PRESSES: u32 = 60;
 
+/// Prints what a selection changes.
+fn print_selected(selected: Option<&SelectedResult>) {
+    if let Some(selected) = selected {
+        outln!("SELECTION {}", selected.line());
+    }
+}
+
 fn run(args: &ExamineArgs, json: bool) -> Outcome {
-    let results = results::analyze_shown(&args.session, AnalysisRequest::default())?;
-    let file = EventFile::open(&args.session)?;
+    let (target, results, selected) = analyzed(&args.session)?;
+    let file = EventFile::open(&target.path)?;
     let source = Source {
         reader: &file.reader,
         header: &file.header,
@@ -157,8 +195,9 @@ fn run(args: &ExamineArgs, json: bool) -> Outcome {
     let start = || Process::start(&args.command);
     let found = challenge::examine(&source, salt()?, timeouts, events, start).map_err(failure)?;
     if json {
-        crate::terminal::print_json(&serde_json::json!(found));
+        print_document(serde_json::json!(found), selected.as_ref());
     } else {
+        print_selected(selected.as_ref());
         print_examination(&found);
     }
     Ok(Exit::Ok)
@@ -191,6 +230,14 @@ fn print_examination(found: &Examination) {
 }
 
 fn print(found: &Judgement) {
+    if let Some(selection) = &found.selection {
+        outln!(
+            "SELECTION `{}` (SHA-256 {}) excludes {} press(es) of the session",
+            selection.name,
+            selection.sha256,
+            selection.excluded
+        );
+    }
     let metrics = &found.metrics;
     let mm = |e: &Estimate| line(e, 1.0, " mm");
     let percent = |e: &Estimate| line(e, 100.0, " %");

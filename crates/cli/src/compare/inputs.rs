@@ -4,18 +4,19 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use skinrig_compare::{Session, Subject};
-use skinrig_recorder::{SessionReader, list};
+use skinrig_recorder::SessionReader;
 
 use super::facts::facts;
-use super::selections::{self, SelectedResult, without_results};
 use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
 use crate::analyze::without_selection;
 use crate::args::CompareArgs;
 use crate::exit::Failure;
 use crate::results::analyze_shown;
+use crate::selection::result::{self, SelectedResult, without_results};
 use crate::selection::{self, Target};
 use crate::sessions::{copies, originals};
+use crate::shelf::Shelf;
 
 /// Most skins in one comparison: letters A to H.
 const MAX_SKINS: usize = 8;
@@ -113,8 +114,7 @@ fn skin_sessions(
 
 /// The sessions of a folder, of one prototype or all. A broken file is an error; it is not skipped.
 fn session_paths(folder: &Path, prototype: Option<&str>) -> Result<Vec<Target>, Failure> {
-    let all = list(folder).map_err(Failure::session)?;
-    let mut selected = all;
+    let mut selected = Shelf::told(folder)?.sessions;
     selected.retain(|s| prototype.is_none() || s.prototype() == prototype);
     for copy in copies(&selected) {
         errln!("note: {copy}");
@@ -160,8 +160,8 @@ fn session(
         None => AnalysisRequest::default(),
     };
     if let Some(selected) = selected {
-        let (analysis, result) = selections::analysis(path, &facts.session_id, selected)?;
-        return Ok((Session { facts, analysis }, Some(result)));
+        let (analysis, stated) = result::analysis(path, &facts.session_id, selected)?;
+        return Ok((Session { facts, analysis }, Some(stated)));
     }
     let analysis = match analyses::stored(path, &facts.session_id, name) {
         Some(analysis) => analysis,

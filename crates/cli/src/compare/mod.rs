@@ -3,7 +3,6 @@
 mod facts;
 mod inputs;
 mod margins;
-mod selections;
 
 use std::path::{Path, PathBuf};
 
@@ -43,8 +42,9 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
             crate::terminal::print_json(&document);
         } else {
             for skin in &found {
-                let lines = skin.selected.iter().map(|s| s.line(skin.subject.letter));
-                lines.for_each(|line| outln!("{line}"));
+                for selected in &skin.selected {
+                    outln!("SELECTION {} {}", skin.subject.letter, selected.line());
+                }
             }
             let table =
                 report::terminal_table(&result, crate::terminal::is_coloured(&std::io::stdout()));
@@ -67,8 +67,11 @@ pub(crate) fn compare(args: &CompareArgs, json: bool) -> Outcome {
 /// Adds the RMSE with and without a selection.
 fn add_selections(document: &mut serde_json::Value, found: &[inputs::SkinSessions]) {
     let all = found.iter().flat_map(|skin| {
-        let letter = skin.subject.letter;
-        skin.selected.iter().map(move |s| s.document(letter))
+        skin.selected.iter().map(|selected| {
+            let mut document = selected.document();
+            document["skin"] = skin.subject.letter.to_string().into();
+            document
+        })
     });
     let all: Vec<_> = all.collect();
     if !all.is_empty() {

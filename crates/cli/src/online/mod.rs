@@ -17,6 +17,7 @@ use skinrig_online::{
     Decoders, Detection, Estimate, Felt, Live, SkinModel, StreamSettings, Training,
 };
 use skinrig_recorder::SessionReader;
+use skinrig_results::AlignedSession;
 
 use crate::analysis_request::AnalysisRequest;
 use crate::args::{OnlineArgs, StopRule};
@@ -24,6 +25,8 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::library::analysis_for_tables;
 use crate::phase::Phase;
 use crate::results::open;
+use crate::selection::result::{self, SelectedResult};
+use crate::selection::{self, Target};
 use crate::signals::on_ctrl_c;
 use crate::terminal::Output;
 
@@ -71,11 +74,14 @@ fn taught(error: impl std::fmt::Display, session: &Path) -> Failure {
     ))
 }
 
-fn learn(args: &OnlineArgs, analysis: &Analysis) -> Result<SkinModel, Failure> {
-    let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
+fn learn(
+    session: &Path,
+    aligned: &AlignedSession,
+    analysis: &Analysis,
+    false_alarms: f64,
+) -> Result<SkinModel, Failure> {
     let _phase = Phase::reading("learning", aligned.events.bytes_read());
-    SkinModel::learn(analysis, &aligned.events, args.false_alarms)
-        .map_err(|e| taught(e, &args.session))
+    SkinModel::learn(analysis, &aligned.events, false_alarms).map_err(|e| taught(e, session))
 }
 
 /// Waits until the session time that has passed since `start` is due.
@@ -275,9 +281,20 @@ fn open_replayable(session: &Path) -> Result<(SessionReader, Analysis), Failure>
     Ok((reader, analysis))
 }
 
-/// As [`open_replayable`]; an INVALID session has nothing to learn from.
-fn open_valid(session: &Path) -> Result<(SessionReader, Analysis), Failure> {
-    let (reader, analysis) = open_replayable(session)?;
+/// As [`open_replayable`], with its selection; an INVALID session has nothing to learn from.
+fn open_valid(
+    target: &Target,
+) -> Result<(SessionReader, Analysis, Option<SelectedResult>), Failure> {
+    let session = &target.path;
+    let (reader, official) = open_replayable(session)?;
+    let (analysis, selected) = match &target.selected {
+        None => (official, None),
+        Some(selected) => {
+            let id = reader.session_id().map_err(Failure::session)?;
+            let (analysis, stated) = result::analysis(session, &id, selected)?;
+            (analysis, Some(stated))
+        }
+    };
     if !analysis.is_valid() {
         return Err(Failure::limit(format!(
             "{0}: expected a valid session, found an INVALID one: {1}\n  next: `skinrig analyze {0}` says what to mend",
@@ -285,7 +302,7 @@ fn open_valid(session: &Path) -> Result<(SessionReader, Analysis), Failure> {
             analysis.invalid_because().join("; ")
         )));
     }
-    Ok((reader, analysis))
+    Ok((reader, analysis, selected))
 }
 
 /// Replays a session as a live source and compares the position at the end of each press window with its analysis.
@@ -319,10 +336,15 @@ pub(crate) fn compare(session: &Path) -> Result<Compared, Failure> {
 /// # Errors
 /// When the session cannot be read or analysed, or has too few calibration presses to learn from.
 pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
-    let (reader, analysis) = open_valid(&args.session)?;
+    let target = selection::sessions(&args.session)?.one(&args.session)?;
+    let (reader, analysis, selected) = open_valid(&target)?;
     let header = reader.header().map_err(Failure::session)?;
-    let (aligned, _) = open(&args.session, AnalysisRequest::default())?;
-    let skin = learn(args, &analysis)?;
+    let choices = AnalysisRequest {
+        selection: target.selected.as_ref(),
+        ..AnalysisRequest::default()
+    };
+    let (aligned, _) = open(&target.path, choices)?;
+    let skin = learn(&target.path, &aligned, &analysis, args.false_alarms)?;
     let both = (&analysis, &aligned.input);
     let replay = replay(args, &reader, both, header.stream_formats, &skin, output)?;
     let felts = Felts::new(
@@ -333,19 +355,25 @@ pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
         replay.until_us,
     );
     if output.json {
-        let summary = json!({ "summary": {
+        let mut summary = json!({ "summary": {
             "rig": header.rig_name, "threshold": skin.threshold(), "places": skin.places(),
             "felt": felts, "speed": replay.speed, "stopped": replay.stopped,
             "windows": replay.compared.windows, "windows_equal_to_analysis": replay.compared.equal,
         }});
+        if let Some(selected) = &selected {
+            summary["summary"]["selection"] = selected.document();
+        }
         outln!("{summary}");
     } else {
+        if let Some(selected) = &selected {
+            outln!("SELECTION {}", selected.line());
+        }
         print(&skin, args.stop_at, &felts, &replay, &header.rig_name);
     }
     if replay.compared.equal < replay.compared.windows {
         return Err(Failure::internal(format!(
             "{}: expected the bits of the analysis in all {} press windows, found them in {}\n  next: analyse the session again, and report this if it stays",
-            args.session.display(),
+            target.path.display(),
             replay.compared.windows,
             replay.compared.equal
         )));

@@ -1,5 +1,6 @@
 //! Session arguments: a session file, or a selection that stands for several.
 
+pub(crate) mod result;
 mod write;
 
 use std::path::{Path, PathBuf};

@@ -259,3 +259,117 @@ fn a_selection_that_does_not_fit_is_rejected_where_it_is_wrong() {
     select(&[]).code(0);
     select(&[]).code(2).expect_stderr(&["expected a new file"]);
 }
+
+/// `online` and `challenge` leave out what a selection excludes, and state it with the RMSE without the selection.
+#[test]
+fn selections_of_one_session_are_replayed_and_given_away() {
+    let lab = Lab::new();
+    let teach = [
+        "--set",
+        "repetitions.count=4",
+        "--set",
+        "evaluation.calibrate=[1, 2, 3]",
+        "--set",
+        "evaluation.score=[4]",
+        "--set",
+        "analysis.calibration=positions",
+        "--set",
+        "analysis.bootstrap_resamples=50",
+    ];
+    let session = recorded(&lab, "s", &teach);
+    let official = read_json(&only(&lab.path("s"), ".results.json"));
+    let presses = official["analysis"]["presses"].as_array().unwrap();
+    let scored: Vec<u64> = presses
+        .iter()
+        .filter(|p| p["role"] == "score")
+        .map(|p| p["press"].as_u64().unwrap())
+        .collect();
+    assert_eq!(scored.len(), 4);
+    let exclude = format!("{}=hit", scored[1]);
+    let chosen = select(&lab, "lamp", &session, &[&exclude]);
+    let hash = crate::support::sha256(&std::fs::read(&chosen).unwrap());
+    let states = |selection: &Value| {
+        assert_eq!(selection["selection"]["sha256"], hash.as_str());
+        assert_eq!(selection["excluded"], 1);
+        let without = &official["analysis"]["scored"]["rmse_mm"];
+        assert_eq!(&selection["rmse_without_mm"], without);
+        assert_ne!(&selection["rmse_mm"], without);
+    };
+    let summary = |of: &str| -> Value {
+        let lines = skinrig(&["--json", "online", of]).code(0).out;
+        serde_json::from_str::<Value>(lines.lines().last().unwrap()).unwrap()["summary"].clone()
+    };
+    let (plain, selected) = (summary(&session), summary(&chosen));
+    assert_eq!(plain.get("selection"), None);
+    states(&selected["selection"]);
+    let count = |of: &Value| of["felt"]["presses"].as_u64().unwrap();
+    assert_eq!(count(&selected) + 1, count(&plain));
+    assert_eq!(selected["windows"], selected["windows_equal_to_analysis"]);
+    let words = skinrig(&["online", &chosen]).code(0).out;
+    assert!(words.starts_with("SELECTION `lamp` (SHA-256 "), "{words}");
+
+    let folder = lab.text("challenge");
+    let made = skinrig(&["--json", "challenge", "make", &chosen, "--out", &folder]);
+    let made = made.code(0).json();
+    assert_eq!(
+        (&made["calibrating"], &made["scored"]),
+        (&12.into(), &3.into())
+    );
+    states(&made["selection"]);
+    let answers = made["answers"].as_str().unwrap().to_owned();
+    assert!(answers.contains(&hash[..16]), "{answers}");
+    let sealed = read_json(Path::new(&answers));
+    let own: Vec<u64> = sealed["presses"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["session_press"].as_u64().unwrap())
+        .collect();
+    assert!(!own.contains(&scored[1]), "{own:?}");
+    let description = read_json(&lab.path("challenge/challenge.json"));
+    for stated in [&sealed["selection"], &description["selection"]] {
+        assert_eq!(
+            (&stated["name"], &stated["sha256"]),
+            (&"lamp".into(), &hash.as_str().into())
+        );
+    }
+    // Estimates of the selected presses are scored under its name.
+    let mut table = "press,x_mm,y_mm\n".to_owned();
+    for press in sealed["presses"].as_array().unwrap() {
+        table += &format!("{},{},{}\n", press["press"], press["x_mm"], press["y_mm"]);
+    }
+    std::fs::write(lab.path("table.csv"), table).unwrap();
+    let score = [
+        "challenge",
+        "score",
+        &folder,
+        &lab.text("table.csv"),
+        "--answers",
+        &answers,
+    ];
+    let score = skinrig(&[&["--json"][..], &score].concat()).code(0).json();
+    assert_eq!(
+        (&score["presses"], &score["selection"]["sha256"]),
+        (&3.into(), &hash.as_str().into())
+    );
+
+    // One session: a selection of two is refused, an invalid one with its findings.
+    let both = lab.text("both.selection.yaml");
+    let other = recorded(&lab, "t", &["--seed", "6"]);
+    skinrig(&["select", &session, &other, "--name", "both", "--out", &both]).code(0);
+    edit(&chosen, "content_sha256: ", "content_sha256: 0");
+    for wrong in [&both, &chosen] {
+        let expected = if *wrong == both {
+            "a selection of one session"
+        } else {
+            "content_sha256"
+        };
+        for command in [
+            &["online", wrong.as_str()][..],
+            &["challenge", "make", wrong, "--out", &lab.text("c2")],
+            &["challenge", "run", wrong, "--", "true"],
+        ] {
+            skinrig(command).code(2).expect_stderr(&[expected]);
+        }
+    }
+}

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use serde_json::Value;
+use skinrig::library::Program;
 use skinrig_recorder::salvage;
+use skinrig_view::Lab as _;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions, Executor};
 
@@ -94,6 +96,8 @@ fn a_catalogue_changes_no_answer() {
     let (s, file) = (lab.text("s"), lab.path("s/catalogue.sqlite"));
     remove_catalogue(&file);
     let (expected, errors) = answers(&lab, variant);
+    let shelf = || Program.shelf(&lab.path("s")).unwrap();
+    let shelf_of_files = shelf();
     assert!(!errors.contains("catalogue"), "{errors}");
     assert_eq!(expected[0].as_array().unwrap().len(), 7);
     assert_eq!(expected[1].as_array().unwrap().len(), 3);
@@ -102,6 +106,8 @@ fn a_catalogue_changes_no_answer() {
     let (found, errors) = answers(&lab, variant);
     assert!(found == expected, "{found:#?} {expected:#?}");
     assert!(!errors.contains("catalogue"), "{errors}");
+    assert_eq!(shelf(), shelf_of_files);
+    assert!(shelf_of_files.iter().any(|s| s.analyses.len() == 2));
 
     // Stale entries: a tag and results that came since, beside the catalogue's back.
     let before = std::fs::read(&file).unwrap();

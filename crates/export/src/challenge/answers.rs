@@ -27,8 +27,22 @@ pub struct Answers {
     pub bootstrap_resamples: u32,
     /// Their seed.
     pub seed: u64,
+    /// The selection behind the challenge; its excluded presses are not part of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selection: Option<ChallengeSelection>,
     /// Scored presses by number.
     pub presses: Vec<Answer>,
+}
+
+/// A selection that excludes presses from a challenge.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ChallengeSelection {
+    /// Its name.
+    pub name: String,
+    /// SHA-256 of its file.
+    pub sha256: String,
+    /// Number of presses that it excludes from the session.
+    pub excluded: u32,
 }
 
 /// Where a press was made.

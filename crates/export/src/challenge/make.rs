@@ -8,7 +8,7 @@ use skinrig_analysis::result::PressResult;
 use skinrig_model::{CameraId, CdEvent, Point2, PressRole, PressTiming, Verdict};
 use skinrig_recorder::RecorderError;
 
-use super::answers::{Answer, Answers, hash, hex};
+use super::answers::{Answer, Answers, ChallengeSelection, hash, hex};
 use super::error::ChallengeError;
 use super::{DESCRIPTION, FORMAT, STEM};
 use crate::csv_files::CsvFiles;
@@ -32,6 +32,9 @@ pub(super) struct Description {
     /// What the events come from: `simulated`, `emulated`, `bench` or `imported`; missing if unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     origin: Option<String>,
+    /// The selection behind it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    selection: Option<ChallengeSelection>,
     /// Presses whose position is given.
     pub calibrating: u32,
     /// Presses to locate.
@@ -64,12 +67,14 @@ impl Description {
 }
 
 /// How to make a challenge.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct ChallengeOptions {
     /// Whether to replace existing files.
     pub overwrite: bool,
     /// What the events come from, for the description.
     pub origin: Option<&'static str>,
+    /// The selection with which the session was analysed.
+    pub selection: Option<ChallengeSelection>,
     /// Random bytes. They decide the order of the presses and are part of the sealed answers, so that nobody who knows the
     /// positions of a plan can find out which press is which by trying.
     pub salt: [u8; 32],
@@ -158,12 +163,17 @@ pub fn make(
     let sealed = Folder::new(parent, &stem, making.overwrite)?;
     let numbered = (1..).zip(&presses).filter(|(_, p)| p.is_scored());
     let numbered: Vec<(u32, &Press<'_>)> = numbered.collect();
-    let text = json(&answers_about(source, &numbered, making.salt)?);
+    let answers_of = Answers {
+        selection: making.selection.clone(),
+        ..answers_about(source, &numbered, making.salt)?
+    };
+    let text = json(&answers_of);
     let answers = write(&sealed, "", &text)?;
     let description = json(&Description {
         format: FORMAT,
         task: TASK.to_owned(),
         origin: making.origin.map(str::to_owned),
+        selection: making.selection.clone(),
         calibrating: calibrating as u32,
         scored: scored as u32,
         answers_sha256: hash(text.as_bytes()),
@@ -237,6 +247,7 @@ pub(super) fn answers_about(
         within_mm: settings.within_mm,
         bootstrap_resamples: settings.bootstrap_resamples,
         seed: settings.seed,
+        selection: None,
         presses: presses
             .iter()
             .map(|(press, p)| Answer {

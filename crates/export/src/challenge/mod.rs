@@ -12,7 +12,7 @@ mod guest;
 mod make;
 mod score;
 
-pub use answers::{Answer, Answers};
+pub use answers::{Answer, Answers, ChallengeSelection};
 pub use error::{ChallengeError, EstimateError};
 pub use estimates::{Estimates, Position};
 pub use guest::{Examination, Guest, GuestError, LeftOut, Timeouts, examine};

@@ -10,7 +10,7 @@ use skinrig_analysis::result::{Estimate, LocationOutcome, Metrics, PressResult};
 use skinrig_analysis::sets::ScoreSet;
 use skinrig_model::{LocationId, Point2, PressId, PressRole, RepetitionId, Verdict};
 
-use super::answers::{Answer, Answers};
+use super::answers::{Answer, Answers, ChallengeSelection};
 use super::error::ChallengeError;
 use super::estimates::{Estimates, Position};
 use super::make::Description;
@@ -24,6 +24,9 @@ pub struct Judgement {
     pub metrics: Metrics,
     /// Share of the located presses within their stated 95 % regions; `None` for a table without regions.
     pub coverage: Option<Estimate>,
+    /// The selection behind the challenge.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub selection: Option<ChallengeSelection>,
 }
 
 /// Scores the table `table` for the challenge in `folder`.
@@ -75,6 +78,7 @@ pub(super) fn judge(answers: &Answers, estimates: &Estimates) -> Judgement {
         coverage: estimates
             .has_regions
             .then(|| share_over_locations(&inside, resamples, seed)),
+        selection: answers.selection.clone(),
     }
 }
 

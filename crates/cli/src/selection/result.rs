@@ -1,4 +1,4 @@
-//! Skins of a selection: their analysis, and the RMSE with and without the selection.
+//! The analysis of a session with a selection, and the RMSE with and without it.
 
 use std::path::{Path, PathBuf};
 
@@ -10,11 +10,11 @@ use skinrig_report::{SelectionEffect, SelectionName};
 use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
-use crate::results::analyze_shown;
+use crate::results::{Results, analyze_shown};
 use crate::selection::SelectedPresses;
 
 /// What a selection changes in a session.
-pub(super) struct SelectedResult {
+pub(crate) struct SelectedResult {
     pub name: SelectionName,
     session: PathBuf,
     rmse_mm: Estimate,
@@ -22,17 +22,12 @@ pub(super) struct SelectedResult {
 }
 
 /// The analysis with the selection: that beside the session, or a new one.
-pub(super) fn analysis(
+pub(crate) fn analysis(
     path: &Path,
     session_id: &str,
     selected: &SelectedPresses,
 ) -> Result<(Analysis, SelectedResult), Failure> {
-    let result = |rmse_mm, effect| SelectedResult {
-        name: selected.name.clone(),
-        session: path.to_owned(),
-        rmse_mm,
-        effect,
-    };
+    let result = |rmse_mm, effect| SelectedResult::new(path, selected, rmse_mm, effect);
     let label = selected.label();
     let stored = analyses::stored(path, session_id, Some(&label));
     let stored = stored.filter(|a| a.settings.selected_out == selected.out);
@@ -46,16 +41,12 @@ pub(super) fn analysis(
         ..AnalysisRequest::default()
     };
     let found = analyze_shown(path, choices).map_err(|f| without_results(path, f))?;
-    let rmse_mm = found.analysis.scored.rmse_mm;
-    let effect = found.provenance.selection.unwrap_or(SelectionEffect {
-        excluded: 0,
-        rmse_without_mm: rmse_mm,
-    });
-    Ok((found.analysis, result(rmse_mm, effect)))
+    let stated = SelectedResult::of(&found, selected);
+    Ok((found.analysis, stated))
 }
 
 /// An analysis that failed, with its session.
-pub(super) fn without_results(path: &Path, failure: Failure) -> Failure {
+pub(crate) fn without_results(path: &Path, failure: Failure) -> Failure {
     Failure {
         message: format!("{}\n  ({}: no results)", failure.message, path.display()),
         ..failure
@@ -63,22 +54,51 @@ pub(super) fn without_results(path: &Path, failure: Failure) -> Failure {
 }
 
 impl SelectedResult {
+    /// Of an analysis of the session at `path`.
+    pub(crate) fn new(
+        path: &Path,
+        selected: &SelectedPresses,
+        rmse_mm: Estimate,
+        effect: SelectionEffect,
+    ) -> Self {
+        Self {
+            name: selected.name.clone(),
+            session: path.to_owned(),
+            rmse_mm,
+            effect,
+        }
+    }
+
+    /// Of new results.
+    pub(crate) fn of(found: &Results, selected: &SelectedPresses) -> Self {
+        let rmse_mm = found.analysis.scored.rmse_mm;
+        let effect = found
+            .provenance
+            .selection
+            .clone()
+            .unwrap_or(SelectionEffect {
+                excluded: 0,
+                rmse_without_mm: rmse_mm,
+            });
+        Self::new(&found.session, selected, rmse_mm, effect)
+    }
+
     /// For programs.
-    pub(super) fn document(&self, skin: char) -> Value {
+    pub(crate) fn document(&self) -> Value {
         json!({
-            "skin": skin, "session": self.session, "selection": self.name, "rmse_mm": self.rmse_mm,
+            "session": self.session, "selection": self.name, "rmse_mm": self.rmse_mm,
             "excluded": self.effect.excluded, "rmse_without_mm": self.effect.rmse_without_mm,
         })
     }
 
     /// The RMSE with and without the selection, in one line.
-    pub(super) fn line(&self, skin: char) -> String {
+    pub(crate) fn line(&self) -> String {
         let mm = |e: &Estimate| {
             e.value
                 .map_or_else(|| "none".to_owned(), |v| format!("{v:.2} mm"))
         };
         format!(
-            "SELECTION {skin} {} excludes {} press(es) of {}: RMSE {}, without the selection {}",
+            "{} excludes {} press(es) of {}: RMSE {}, without the selection {}",
             self.name,
             self.effect.excluded,
             self.session.display(),
