@@ -170,6 +170,7 @@ fn analyze_by(
     let depths = depths.collect();
     let both = [&scored.rmse_mm, &scored_without_exclusions.rmse_mm];
     warnings.extend(verdict::exclusion_warning(&presses, both));
+    warnings.extend(verdict::nothing_counts(&presses));
     if scores.presses().is_empty() {
         warnings.push(WarningCause::NoScoredPress.into());
     }

@@ -1,7 +1,8 @@
 //! Validates the input of an analysis before it begins.
 
 use skinrig_model::{
-    AnalysisSettings, CameraId, PlannedPress, Point2, RigGeometry, SENSOR_HEIGHT, SkinOutline,
+    AnalysisSettings, CameraId, PlannedPress, Point2, PressRole, RigGeometry, SENSOR_HEIGHT,
+    SkinOutline,
 };
 use skinrig_settings::Settings;
 
@@ -32,6 +33,7 @@ pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
     }
     settings(&input.settings)?;
     presses(&input.planned)?;
+    excluded(&input.planned, &input.settings)?;
     geometry(&input.rig)
 }
 
@@ -48,14 +50,24 @@ pub fn before_recording(
     settings(chosen)?;
     presses(planned)?;
     ContactMap::new(outline, &chosen.cmre)?;
+    excluded(planned, chosen)
+}
+
+/// Presses excluded by hand are in the plan, and of those that a rule can exclude.
+fn excluded(planned: &[PlannedPress], chosen: &AnalysisSettings) -> Result<(), AnalysisError> {
     for press in &chosen.exclude_press_numbers {
-        if !planned.iter().any(|p| p.id == *press) {
-            return Err(AnalysisError::Setting {
-                name: "exclude_press_numbers".to_owned(),
-                expected: format!("presses of the plan, which has {}", planned.len()),
-                found: press.to_string(),
-            });
-        }
+        let expected = match planned.iter().find(|p| p.id == *press) {
+            None => format!("presses of the plan, which has {}", planned.len()),
+            Some(p) if p.role == PressRole::Sync => {
+                "other presses than those for synchronisation, which never score".to_owned()
+            }
+            Some(_) => continue,
+        };
+        return Err(AnalysisError::Setting {
+            name: "exclude_press_numbers".to_owned(),
+            expected,
+            found: press.to_string(),
+        });
     }
     Ok(())
 }

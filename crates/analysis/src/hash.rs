@@ -4,19 +4,20 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::result::{
-    Analysis, CalibrationResult, Indentation, LocationOutcome, Metrics, PressCounts, PressResult,
-    PressView, Region,
+    Analysis, CalibrationResult, Indentation, Latency, LocationOutcome, Metrics, PressCounts,
+    PressResult, PressView, Region,
 };
 use crate::rule::Rule;
 use skinrig_model::{
     AnalysisSettings, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry, Verdict,
 };
 
-/// Content of the digest: settings, geometry, table of presses and metrics. It excludes absolute times, so that a replay at
+/// Content of the digest: settings, geometry, table of presses, metrics, and whether they may be used. It excludes absolute times, so that a replay at
 /// another time has the same digest, and texts, so that a reworded message does not change it.
 #[derive(Serialize)]
 struct Results<'a> {
     version: u32,
+    is_valid: bool,
     settings: &'a AnalysisSettings,
     geometry: &'a StereoGeometry,
     counts: &'a PressCounts,
@@ -25,6 +26,7 @@ struct Results<'a> {
     scored_without_exclusions: &'a Metrics,
     presses: Vec<Row<'a>>,
     indentation: &'a Option<Indentation>,
+    latency: &'a Option<Latency>,
 }
 
 #[derive(Serialize)]
@@ -70,6 +72,7 @@ impl<'a> Row<'a> {
 pub fn results_hash(analysis: &Analysis) -> String {
     let results = Results {
         version: analysis.version,
+        is_valid: analysis.is_valid(),
         settings: &analysis.settings,
         geometry: &analysis.geometry,
         counts: &analysis.counts,
@@ -78,6 +81,7 @@ pub fn results_hash(analysis: &Analysis) -> String {
         scored_without_exclusions: &analysis.scored_without_exclusions,
         presses: analysis.presses.iter().map(Row::of).collect(),
         indentation: &analysis.indentation,
+        latency: &analysis.latency,
     };
     let mut digest = HashWriter(Sha256::new());
     // Neither the writer nor the types can fail: no maps with non-string keys, no I/O.

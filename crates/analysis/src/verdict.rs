@@ -251,6 +251,31 @@ pub(crate) fn exclusion_warning(presses: &[PressResult], rmse: [&Estimate; 2]) -
     Some(cause.into())
 }
 
+/// A warning if no press gives a number: no scored one, or none at all of a plan that only calibrates.
+#[must_use]
+pub(crate) fn nothing_counts(presses: &[PressResult]) -> Option<Warning> {
+    let of = |role: PressRole| {
+        let presses = presses.iter().filter(move |p| p.role == role);
+        presses.map(|p| p.verdict).collect::<Vec<_>>()
+    };
+    let scored = of(PressRole::Score);
+    let all = if scored.is_empty() {
+        of(PressRole::Calibrate)
+    } else {
+        scored
+    };
+    let number = |verdict| all.iter().filter(|v| **v == verdict).count() as u32;
+    (number(Verdict::Valid) == 0).then(|| {
+        let cause = WarningCause::NothingCounts {
+            planned: all.len() as u32,
+            missed: number(Verdict::Missed),
+            invalid: number(Verdict::Invalid),
+            excluded: number(Verdict::Excluded),
+        };
+        cause.into()
+    })
+}
+
 /// Counts the verdicts.
 #[must_use]
 pub fn count(presses: &[PressResult]) -> PressCounts {

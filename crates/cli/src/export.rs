@@ -66,11 +66,11 @@ fn export_one(
     let header = reader.header().map_err(Failure::session)?;
     let folder = folder(args, target, if is_bundle { ".bundle" } else { ".export" })?;
     let (written, invalid) = if is_bundle {
-        let mut written = bundle(&target.path, &reader, &header, &folder)?;
+        let (mut written, invalid) = bundle(&target.path, &reader, &header, &folder)?;
         if let Some(key) = &args.sign {
             written.push(signature::sign(key, &folder.path().join(MANIFEST))?);
         }
-        (written, None)
+        (written, invalid)
     } else {
         files(args, target, &reader, &header, &folder)?
     };
@@ -172,16 +172,20 @@ fn files(
     for kind in &kinds {
         written.extend(one_kind(*kind, &source, &tables, folder).map_err(refused)?);
     }
-    let invalid = results.as_ref().filter(|r| !r.analysis.is_valid());
-    let invalid = invalid.map(|results| {
-        Failure::limit(format!(
-            "{0}: INVALID, do not use the exported numbers (`valid` is false in the table of results): {1}\n  next: `skinrig analyze {0}` \
-             says what to mend",
-            target.path.display(),
-            results.analysis.invalid_because().join("; ")
-        ))
-    });
+    let invalid = results.and_then(|results| invalid(&target.path, &results.analysis));
     Ok((written, invalid))
+}
+
+/// The failure of an export with the numbers of an INVALID session.
+fn invalid(session: &Path, analysis: &Analysis) -> Option<Failure> {
+    (!analysis.is_valid()).then(|| {
+        Failure::limit(format!(
+            "{0}: INVALID, do not use the exported numbers (`valid` is false in the results): {1}\n  next: `skinrig analyze {0}` says \
+             what to mend",
+            session.display(),
+            analysis.invalid_because().join("; ")
+        ))
+    })
 }
 
 fn analysis_and_legs(results: &Results) -> (&Analysis, &[LegStart]) {
@@ -266,7 +270,8 @@ fn cameras(
         .collect()
 }
 
-/// Writes the files of a bundle that follow from the session: all but the session itself and its tags.
+/// Writes the files of a bundle that follow from the session: all but the session itself and its tags. Returns the failure of an INVALID
+/// session, too.
 ///
 /// # Errors
 /// [`Failure::input`] for a session that cannot be analysed; [`Failure::internal`] when a file cannot be written.
@@ -275,7 +280,7 @@ pub(crate) fn derived(
     reader: &SessionReader,
     header: &RunHeader,
     folder: &Folder,
-) -> Result<Vec<PathBuf>, Failure> {
+) -> Result<(Vec<PathBuf>, Option<Failure>), Failure> {
     let mut results = results::analyze_shown(session, AnalysisRequest::default())?;
     // Measured on one machine at one time: it does not follow from the session.
     results.tradeoff = None;
@@ -293,7 +298,7 @@ pub(crate) fn derived(
     ] {
         written.extend(one_kind(kind, &source, tables, folder).map_err(refused)?);
     }
-    Ok(written)
+    Ok((written, invalid(session, &results.analysis)))
 }
 
 /// Writes results and report.
@@ -348,7 +353,7 @@ pub(crate) fn bundle(
     reader: &SessionReader,
     header: &RunHeader,
     folder: &Folder,
-) -> Result<Vec<PathBuf>, Failure> {
+) -> Result<(Vec<PathBuf>, Option<Failure>), Failure> {
     if reader.seal().map_err(Failure::session)?.is_none() {
         return Err(Failure::input(format!(
             "{}: expected a sealed session for a bundle, found one that is still running or was cut off\n  next: `skinrig resume` \
@@ -378,7 +383,8 @@ pub(crate) fn bundle(
     if tags.is_file() {
         written.push(copy(&tags, TAGS).map_err(refused)?);
     }
-    written.extend(derived(session, reader, header, folder)?);
+    let (files, invalid) = derived(session, reader, header, folder)?;
+    written.extend(files);
     let name = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
@@ -395,5 +401,5 @@ pub(crate) fn bundle(
     )
     .map_err(refused)?;
     written.push(folder.path().join(MANIFEST));
-    Ok(written)
+    Ok((written, invalid))
 }

@@ -246,7 +246,10 @@ pub(crate) fn print_results(
 pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
     let analysis = &results.analysis;
     if !analysis.is_valid() {
-        let next = if analysis.alignment.is_usable() {
+        let next = if analysis.may_calibrate() {
+            "see in the report why each press does not count; record what is missing with `skinrig resume`, or undo the rule or the \
+             selection that excludes all"
+        } else if analysis.alignment.is_usable() {
             "fix what the audit reports (each finding has a next step), then import or analyse again"
         } else {
             "see the alignment certificate in the report; limits are below `analysis.alignment`"

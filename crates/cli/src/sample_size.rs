@@ -13,7 +13,7 @@ use crate::analysis_request::AnalysisRequest;
 use crate::args::DetectArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::clock_text;
-use crate::results::analyze_shown;
+use crate::results::{analyze_shown, check_limit};
 
 /// Below this number of locations the estimated variance is poor: its 95 % interval spans a factor of 6 or more.
 const FEW_LOCATIONS: u32 = 12;
@@ -21,14 +21,17 @@ const FEW_LOCATIONS: u32 = 12;
 /// Proposes the presses on each of two skins that show a difference in RMSE.
 ///
 /// # Errors
-/// [`Failure::input`] for a session that cannot be analysed, has no scored presses, or has too few data.
+/// [`Failure::input`] for a session that cannot be analysed, has no scored presses, or has too few data; [`Failure::limit`] for an INVALID
+/// one.
 pub(crate) fn propose(
     difference_mm: f64,
     session: &Path,
     args: &DetectArgs,
     json: bool,
 ) -> Outcome {
-    let analysis = analyze_shown(session, AnalysisRequest::default())?.analysis;
+    let results = analyze_shown(session, AnalysisRequest::default())?;
+    check_limit(&results, None)?;
+    let analysis = results.analysis;
     let refused = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", session.display()));
     let sample = errors(&analysis).map_err(|e| refused(&e))?;
     let measured = power::measure(&sample).map_err(|e| refused(&e))?;

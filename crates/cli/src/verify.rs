@@ -169,7 +169,7 @@ fn compare_with_rebuilt(
     let stem = beside(&inside, "");
     let stem = stem.file_name().unwrap_or_default().to_string_lossy();
     let scratch = Folder::new(place.path(), &stem, false).map_err(Failure::internal)?;
-    let made = export::derived(&inside, &reader, &header, &scratch)?;
+    let (made, _) = export::derived(&inside, &reader, &header, &scratch)?;
     let software = crate::version::SOFTWARE;
     let mut known = BTreeSet::from([report.session.clone(), format!("{stem}{}", export::TAGS)]);
     let mut problems = Vec::new();

@@ -8,7 +8,7 @@ use skinrig_model::{PressRole, RepetitionId, Verdict as PressVerdict};
 
 use crate::locations::Locations;
 use crate::metrics::Metric;
-use crate::subject::Subject;
+use crate::subject::{Session, Subject};
 use skinrig_statistics::{
     AlphaSpending, ComparisonTarget, Interval, Outlook, Sample, Settings, Verdict, compare,
 };
@@ -142,13 +142,7 @@ impl Repetitions {
         order.sort_by_key(|i| &subject.sessions[*i].facts.started);
         let (mut complete, mut incomplete) = (Vec::new(), 0);
         for session in order {
-            let presses = &subject.sessions[session].analysis.presses;
-            let mut whole: BTreeMap<RepetitionId, bool> = BTreeMap::new();
-            for press in presses.iter().filter(|p| p.role == PressRole::Score) {
-                *whole.entry(press.repetition).or_insert(true) &=
-                    press.verdict != PressVerdict::Missed;
-            }
-            for (repetition, is_whole) in whole {
+            for (repetition, is_whole) in scored_repetitions(&subject.sessions[session]) {
                 if is_whole {
                     complete.push((session, repetition));
                 } else {
@@ -161,6 +155,16 @@ impl Repetitions {
             incomplete,
         }
     }
+}
+
+/// Scored repetitions of a session, and whether all of their presses were made.
+pub(crate) fn scored_repetitions(session: &Session) -> BTreeMap<RepetitionId, bool> {
+    let presses = session.analysis.presses.iter();
+    let mut whole = BTreeMap::new();
+    for press in presses.filter(|p| p.role == PressRole::Score) {
+        *whole.entry(press.repetition).or_insert(true) &= press.verdict != PressVerdict::Missed;
+    }
+    whole
 }
 
 /// Both skins without the scored presses beyond the first `number` complete repetitions.

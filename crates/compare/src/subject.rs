@@ -29,6 +29,9 @@ pub struct SessionFacts {
     /// Documentation of the settings among them, by path.
     #[serde(skip)]
     pub docs: BTreeMap<String, String>,
+    /// CRC-32 and length of the chunks with events: what was recorded, whatever the session is called.
+    #[serde(skip)]
+    pub chunks: BTreeSet<(u32, u64)>,
 }
 
 /// A session with its results.
@@ -49,6 +52,20 @@ pub struct Subject {
     pub name: String,
     /// At least one.
     pub sessions: Vec<Session>,
+}
+
+impl SessionFacts {
+    /// True if both hold the same bytes, imported or replayed twice.
+    pub(crate) fn is_same_recording(&self, other: &Self) -> bool {
+        let fewer = self.chunks.len().min(other.chunks.len());
+        let shared = self.chunks.intersection(&other.chunks).count();
+        fewer > 0 && 2 * shared > fewer
+    }
+
+    /// True if a simulation made it. Simulations of the same seed are alike; that has a check of its own.
+    pub(crate) fn is_simulated(&self) -> bool {
+        self.origin.as_deref() == Some("simulated")
+    }
 }
 
 impl Subject {

@@ -249,6 +249,13 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
                 );
             }
             let verdict = attempt.outcome.as_ref().map(|o| &o.verdict);
+            if matches!(verdict, Some(PressVerdict::Missed(_))) && attempt.intent.is_some() {
+                report.mismatch(
+                    attempt.id,
+                    "no start of a press that was never attempted",
+                    "one",
+                );
+            }
             if let Some(next) = attempts.get(number as usize) {
                 match verdict {
                     None => {

@@ -1,31 +1,44 @@
 //! Owns the calibration of an earlier session: whether it may be about the same skin, and its analysis.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use skinrig_analysis::locator::EarlierCalibration;
 use skinrig_analysis::result::EarlierSession;
 use skinrig_analysis::{AnalysisError, analyze as analyze_input};
-use skinrig_model::{AnalysisSettings, CameraId, DeviceRole};
-use skinrig_recorder::{RecorderError, SessionReader};
+use skinrig_model::{AnalysisSettings, CameraId, DeviceRole, Setting};
+use skinrig_protocol::Protocol;
+use skinrig_recorder::{DeviceRow, RecorderError, SessionReader};
 
 use crate::earlier_mismatch::EarlierMismatch;
 use crate::error::ResultsError;
+use crate::events::SessionEvents;
+use crate::rig_document::RigDocument;
 use crate::session::Session;
 use crate::settings::AnalysisOptions;
+use crate::shared_events::{event_runs, shared};
 
-/// Analyses the session at `path` as far as its calibration, with the settings of `session`, so that the columns of both mean
+/// Larger shares of the same events are those of the same presses. Simulations with the same seed share sync presses and noise between
+/// presses.
+const SAME_EVENTS: f64 = 0.25;
+
+/// Analyses the session at `path` as far as its calibration, with the settings of `session`, whose events are `events`, so that the columns of both mean
 /// the same. Presses that the earlier protocol excludes by hand stay excluded.
 ///
 /// # Errors
 /// [`ResultsError::Earlier`] if it cannot be about the same skin and cameras; else as for any analysis.
 pub(crate) fn calibration(
     session: &Session,
+    events: &SessionEvents,
     path: &Path,
 ) -> Result<EarlierCalibration, ResultsError> {
     let mut earlier = Session::open(path, AnalysisOptions::default())?;
-    if let Some(why) = mismatch(session, &earlier)? {
+    let refused = |why: EarlierMismatch| {
         let path = path.to_owned();
-        return Err(ResultsError::Earlier { path, why });
+        Err(ResultsError::Earlier { path, why })
+    };
+    if let Some(why) = mismatch(session, &earlier)? {
+        return refused(why);
     }
     earlier.settings = AnalysisSettings {
         exclude_press_numbers: earlier.settings.exclude_press_numbers,
@@ -40,6 +53,11 @@ pub(crate) fn calibration(
         started: earlier.header.started_at.clone(),
     };
     let aligned = earlier.read_input()?.align();
+    let same = shared(&event_runs(events)?, &event_runs(&aligned.events)?);
+    if same > SAME_EVENTS {
+        let percent = 100.0 * same;
+        return refused(EarlierMismatch::SameEvents { percent });
+    }
     let analysis = analyze_input(&aligned.input, &aligned.events)?;
     Ok(EarlierCalibration::new(about, &analysis).map_err(AnalysisError::from)?)
 }
@@ -56,32 +74,100 @@ fn mismatch(this: &Session, earlier: &Session) -> Result<Option<EarlierMismatch>
     if this.rig.outline != earlier.rig.outline {
         return Ok(Some(EarlierMismatch::OtherOutline));
     }
+    let tips = [earlier, this].map(tips);
+    let shared = tips[1].iter().find_map(|(name, this)| {
+        let earlier = tips[0].get(name)?;
+        (earlier != this).then(|| (earlier.clone(), this.clone()))
+    });
+    if let Some((earlier, this)) = shared {
+        return Ok(Some(EarlierMismatch::OtherTip { earlier, this }));
+    }
     for camera in CameraId::ALL {
         let k = camera.index();
         if this.rig.nominal.cameras[k] != earlier.rig.nominal.cameras[k] {
             return Ok(Some(EarlierMismatch::OtherGeometry { camera }));
         }
-        let serials = (
-            serial(&earlier.reader, camera)?,
-            serial(&this.reader, camera)?,
+        let devices = (
+            device(&earlier.reader, camera)?,
+            device(&this.reader, camera)?,
         );
-        if let (Some(earlier), Some(this)) = serials
-            && earlier != this
-        {
+        let (Some(earlier), Some(this)) = devices else {
+            continue;
+        };
+        let serials = [&earlier, &this].map(|d| d.identity.serial.clone());
+        if serials[0] != serials[1] && serials.iter().all(|s| !s.is_empty()) {
+            let [earlier, this] = serials;
             return Ok(Some(EarlierMismatch::OtherCamera {
                 camera,
                 earlier,
                 this,
             }));
         }
+        if let Some(other) = other_setting(camera, &earlier, &this) {
+            return Ok(Some(other));
+        }
     }
     Ok(None)
 }
 
-/// Serial number of a camera; `None` if the session states none, as an import does.
-fn serial(reader: &SessionReader, camera: CameraId) -> Result<Option<String>, RecorderError> {
+/// A camera as recorded by the last leg; `None` if the session has none, as an import.
+fn device(reader: &SessionReader, camera: CameraId) -> Result<Option<DeviceRow>, RecorderError> {
     let role = DeviceRole::of_camera(camera);
-    let mut devices = reader.devices()?.into_iter().rev();
-    let own = devices.find(|d| d.role == role);
-    Ok(own.map(|d| d.identity.serial).filter(|s| !s.is_empty()))
+    Ok(reader.devices()?.into_iter().rev().find(|d| d.role == role))
+}
+
+/// The first setting of a camera that changes which events it sends.
+fn other_setting(
+    camera: CameraId,
+    earlier: &DeviceRow,
+    this: &DeviceRow,
+) -> Option<EarlierMismatch> {
+    let settings = [earlier, this].map(|device| {
+        let all = device.settings.iter().filter(|s| {
+            s.name.starts_with("bias") || matches!(s.name.as_str(), "roi" | "noise_filter")
+        });
+        all.map(|s| (s.name.as_str(), value(s)))
+            .collect::<BTreeMap<_, _>>()
+    });
+    let names = settings[0].keys().chain(settings[1].keys());
+    let of = |k: usize, name: &str| settings[k].get(name).copied().unwrap_or("not set");
+    let mut names = names.filter(|name| of(0, name) != of(1, name));
+    names.next().map(|name| EarlierMismatch::OtherSetting {
+        camera,
+        name: (*name).to_owned(),
+        earlier: of(0, name).to_owned(),
+        this: of(1, name).to_owned(),
+    })
+}
+
+/// Some cameras cannot read back what was requested.
+fn value(setting: &Setting) -> &str {
+    if setting.was_requested() {
+        &setting.requested
+    } else {
+        &setting.read_back
+    }
+}
+
+/// The tip, as protocol and rig describe it.
+fn tips(session: &Session) -> BTreeMap<&'static str, String> {
+    let header = &session.header;
+    let mut tips = BTreeMap::new();
+    let no_file = |p: &Path| Err(std::io::Error::other(p.display().to_string()));
+    let text = header.protocol_text.as_bytes();
+    let name = &header.protocol_name;
+    let protocol = Protocol::parse_recorded(name, text, &header.overrides, &no_file);
+    let tip = protocol.ok().and_then(|p| p.prototype.tip);
+    tips.extend(tip.map(|tip| ("prototype", format!("`{tip}`"))));
+    let rig = serde_json::from_str::<RigDocument>(&header.rig_json).ok();
+    let rig = rig.map(|r| r.rig).unwrap_or_default();
+    let (shape, size) = (rig["tip"]["shape"].as_str(), rig["tip"]["size_mm"].as_f64());
+    tips.extend(
+        shape
+            .zip(size)
+            .map(|(shape, mm)| ("bench", format!("{shape} of {mm} mm"))),
+    );
+    let side = rig["tip_side_mm"].as_f64();
+    tips.extend(side.map(|mm| ("simulation", format!("cube of {mm} mm"))));
+    tips
 }

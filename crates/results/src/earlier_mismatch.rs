@@ -3,11 +3,21 @@
 use skinrig_model::CameraId;
 
 /// Why the calibration of another session cannot be about this one's skin and cameras.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EarlierMismatch {
     /// It is this session.
     #[error("expected another session, found this one\n  next: leave --calibration-from out")]
     SameSession,
+    /// It holds events of this session: the presses that score would calibrate.
+    #[error(
+        "expected a recording of other presses, found {percent:.0} % of the same events: a replay, a copy or a part of this session, or \
+         a simulation with the same seed and presses\n  next: take the calibration from a session recorded at another time, or \
+         leave --calibration-from out"
+    )]
+    SameEvents {
+        /// Share of the events of the smaller session that are in the other, percent.
+        percent: f64,
+    },
     /// Another skin was pressed.
     #[error(
         "expected the skin `{this}`, found `{earlier}`\n  next: take the calibration from a session of `{this}`, or calibrate in full"
@@ -40,6 +50,32 @@ pub enum EarlierMismatch {
         /// Serial number in the earlier session.
         earlier: String,
         /// Serial number in this one.
+        this: String,
+    },
+    /// The skin was pressed with another tip.
+    #[error(
+        "expected the tip {this}, found {earlier}: another contact area moves the centroids\n  next: take the calibration from a session \
+         with the same tip, or calibrate in full"
+    )]
+    OtherTip {
+        /// Tip in the earlier session.
+        earlier: String,
+        /// Tip in this one.
+        this: String,
+    },
+    /// A camera had other settings.
+    #[error(
+        "expected {camera} with {name} {this}, found {earlier}: other events have other centroids\n  next: take the calibration from a \
+         session with the same camera settings, or calibrate in full"
+    )]
+    OtherSetting {
+        /// The camera.
+        camera: CameraId,
+        /// Name of the setting.
+        name: String,
+        /// Value in the earlier session.
+        earlier: String,
+        /// Value in this one.
         this: String,
     },
 }

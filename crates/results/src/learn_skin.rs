@@ -20,7 +20,7 @@ pub fn learn_skin(path: &Path, false_alarms_hz: f64) -> Result<SkinModel, Result
         let legs = analyzed.legs.len() + 1;
         return Err(NotLearnt::Legs { legs }.into());
     }
-    if !analyzed.analysis.is_valid() {
+    if !analyzed.analysis.may_calibrate() {
         let because = analyzed.analysis.invalid_because();
         return Err(NotLearnt::Invalid { because }.into());
     }

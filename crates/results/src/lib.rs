@@ -20,6 +20,7 @@ mod origin;
 mod rig_document;
 mod session;
 mod settings;
+mod shared_events;
 mod stages;
 mod take_look;
 mod window;

@@ -90,7 +90,7 @@ impl AlignedSession {
             Retention::Scored
         };
         let earlier = self.session.calibration_from.as_deref();
-        let earlier = earlier.map(|path| earlier::calibration(&self.session, path));
+        let earlier = earlier.map(|path| earlier::calibration(&self.session, &self.events, path));
         let (mut analysis, kept) = match earlier.transpose()? {
             None => analyze_with_events(&self.input, &self.events, keep)?,
             Some(earlier) => analyze_recalibrated(&self.input, &self.events, keep, &earlier)?,

@@ -237,6 +237,15 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
              91 % of the idle events; look for reflections and flickering lamps",
         ),
         (
+            json!({"camera": "camera2", "kind": "hot_pixels", "pixels": 1, "of": 112_640, "highest_per_s": 38.0, "idle_share": 0.02}),
+            "camera 2: 1 hot pixels are left out: they fire without presses, up to 38 times a second, 2 % of the idle events; look \
+             for reflections and flickering lamps",
+        ),
+        (
+            json!({"kind": "nothing_counts", "planned": 20, "missed": 12, "invalid": 3, "excluded": 5}),
+            "expected at least one of 20 presses to count, found none: 12 missed, 3 invalid, 5 excluded",
+        ),
+        (
             json!({"kind": "no_scored_press"}),
             "no scored press was attempted, so there are no metrics",
         ),

@@ -1,13 +1,26 @@
 //! Decides whether the numbers of an analysis may be used.
 
-use super::Analysis;
+use super::{Analysis, WarningCause};
 
 impl Analysis {
-    /// False if the numbers of the session must not be used: its clocks are not known well enough, or the audit found that
-    /// positions, cameras or rows are not what they claim to be.
+    /// False if the numbers of the session must not be used: its clocks are not known well enough, the audit found that
+    /// positions, cameras or rows are not what they claim to be, or no press counts.
     #[must_use]
     pub fn is_valid(&self) -> bool {
+        self.may_calibrate() && self.nothing_counts().is_none()
+    }
+
+    /// Like [`Self::is_valid`], for what the calibration presses alone give: no scored press need count yet.
+    #[must_use]
+    pub fn may_calibrate(&self) -> bool {
         self.alignment.is_usable() && !self.findings.iter().any(|f| f.invalidates)
+    }
+
+    /// The warning that no press gives a number.
+    #[must_use]
+    pub fn nothing_counts(&self) -> Option<&WarningCause> {
+        let mut causes = self.warnings.iter().map(|w| &w.cause);
+        causes.find(|c| matches!(c, WarningCause::NothingCounts { .. }))
     }
 
     /// Why the numbers must not be used, one text per reason; empty for a valid session.
@@ -24,6 +37,7 @@ impl Analysis {
             Some(camera) => format!("{} ({camera}): {}", f.fault.name(), f.evidence),
             None => format!("{}: {}", f.fault.name(), f.evidence),
         });
-        clocks.chain(found).collect()
+        let nothing = self.nothing_counts().map(ToString::to_string);
+        clocks.chain(found).chain(nothing).collect()
     }
 }

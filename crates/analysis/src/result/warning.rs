@@ -208,9 +208,9 @@ pub enum WarningCause {
     },
     /// Hot pixels are left out.
     #[error(
-        "{pixels} hot pixels are left out ({:.2} % of the crop): they fire without presses, up to {highest_per_s:.0} times a second, \
+        "{pixels} hot pixels are left out{}: they fire without presses, up to {highest_per_s:.0} times a second, \
          {:.0} % of the idle events; look for reflections and flickering lamps",
-        100.0 * f64::from(*.pixels) / f64::from(*.of), 100.0 * .idle_share
+        share_of_crop(*.pixels, *.of), 100.0 * .idle_share
     )]
     HotPixels {
         /// Hot pixels.
@@ -225,6 +225,20 @@ pub enum WarningCause {
     /// No metrics.
     #[error("no scored press was attempted, so there are no metrics")]
     NoScoredPress,
+    /// No press gives a number, which makes the session INVALID.
+    #[error(
+        "expected at least one of {planned} presses to count, found none: {missed} missed, {invalid} invalid, {excluded} excluded"
+    )]
+    NothingCounts {
+        /// Scored presses of the plan; of a plan without, those that calibrate.
+        planned: u32,
+        /// Of these, presses never attempted.
+        missed: u32,
+        /// Of these, presses not done as planned.
+        invalid: u32,
+        /// Of these, presses that a rule excludes.
+        excluded: u32,
+    },
     /// The data decided when to stop.
     #[error(
         "the looks decided when to end: 95 % intervals do not allow for that, those of the looks do ({looks} of {declared} taken)"
@@ -466,6 +480,16 @@ fn most(common: Option<&CommonExclusion>) -> String {
         let (n, label) = (common.presses, common.example.label());
         format!(" (most often, {n} times: {label})")
     })
+}
+
+/// Share of the crop in brackets; empty if it rounds to nothing.
+fn share_of_crop(pixels: u32, of: u32) -> String {
+    let percent = 100.0 * f64::from(pixels) / f64::from(of);
+    if percent < 0.005 {
+        String::new()
+    } else {
+        format!(" ({percent:.2} % of the crop)")
+    }
 }
 
 fn in_words(rmse: &Estimate) -> String {

@@ -110,7 +110,7 @@ pub(crate) struct RunArgs {
     pub no_analysis: bool,
 
     /// Fail (exit code 4) when the scored RMSE exceeds this, in mm.
-    #[arg(long, value_name = "MM", value_parser = limit_mm)]
+    #[arg(long, value_name = "MM", value_parser = limit_mm, conflicts_with = "no_analysis")]
     pub max_rmse: Option<f64>,
 }
 

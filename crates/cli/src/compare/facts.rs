@@ -1,6 +1,6 @@
 //! Collects the facts of a session that a comparison checks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde_json::Value;
@@ -50,10 +50,12 @@ pub(super) fn facts(
         "session.end",
         end.map_or("not ended", |(_, e)| e.name()).to_owned(),
     );
-    let mut lost = 0;
+    let (mut lost, mut recorded) = (0, BTreeSet::new());
     for camera in CameraId::ALL {
         let chunks = reader.chunk_index(camera).map_err(unreadable)?;
         lost += chunks.iter().map(|c| c.lost_before).sum::<u64>();
+        let with_events = chunks.iter().filter(|c| c.facts.cd_events > 0);
+        recorded.extend(with_events.map(|c| (c.raw_crc32, c.raw_bytes)));
     }
     add("session.lost_bytes", lost.to_string());
     for device in reader.devices().map_err(unreadable)? {
@@ -67,10 +69,13 @@ pub(super) fn facts(
                 .iter()
                 .filter(|s| s.name.starts_with("bias"))
             {
-                add(
-                    &format!("bias.{role}.{}", setting.name),
-                    setting.read_back.clone(),
-                );
+                // Some cameras cannot read back what was requested.
+                let value = if setting.was_requested() {
+                    &setting.requested
+                } else {
+                    &setting.read_back
+                };
+                add(&format!("bias.{role}.{}", setting.name), value.clone());
             }
         }
     }
@@ -99,6 +104,7 @@ pub(super) fn facts(
         rig_name: header.rig_name.clone(),
         values,
         docs,
+        chunks: recorded,
     })
 }
 

@@ -45,11 +45,34 @@ fn results_that_were_edited_or_are_older_than_their_session_are_not_used() {
     edited(moved);
     assert_eq!(table(&a, &b), before);
     edited(&|document| {
+        for onset in document["analysis"]["latency"]["onsets"]
+            .as_array_mut()
+            .unwrap()
+        {
+            onset[1] = Value::from(1.0);
+        }
+    });
+    assert_eq!(table(&a, &b), before);
+    edited(&|document| {
         moved(document);
         document["provenance"]["content_sha256"] = Value::from("0".repeat(64));
         document["summary"]["content_sha256"] = Value::from("0".repeat(64));
     });
     assert_eq!(table(&a, &b), before);
+    // What makes a session INVALID stays.
+    let strict = "analysis.alignment.max_camera_interval=0.5us";
+    let invalid = record(&lab, "i", "3", &["--set", strict]);
+    skinrig(&["analyze", &invalid]).code(4);
+    let path = only(&lab.path("i"), ".results.json");
+    let mut document = crate::support::read_json(&path);
+    let alignment = &mut document["analysis"]["alignment"];
+    alignment["status"] = Value::from("valid");
+    alignment["violations"] = Value::Array(Vec::new());
+    std::fs::write(&path, serde_json::to_string_pretty(&document).unwrap()).unwrap();
+    skinrig(&["compare", &a, &invalid])
+        .code(2)
+        .expect_stderr(&["a session is INVALID"]);
+
     let listed = skinrig(&["prototypes", &lab.text("b")]).code(0).out;
     assert!(!listed.contains("RMSE 2"), "{listed}");
 }
@@ -93,6 +116,28 @@ fn sides_of_two_skins_and_of_other_depth_shares_and_planted_faults_are_refused()
             "67 % at 1.5 mm",
             "--despite depth-shares",
         ]);
+
+    // The second round leaves out three of four locations on one side.
+    let b = record(&lab, "b", "6", &[]);
+    let easy = lab.text("easy.selection.yaml");
+    let select = [
+        "select",
+        &b,
+        "--name",
+        "easy",
+        "--exclude",
+        "8-10=unlucky",
+        "--decided-by",
+        "A. Person",
+        "--out",
+        &easy,
+    ];
+    skinrig(&select).code(0);
+    skinrig(&["compare", &a, &easy]).code(2).expect_stderr(&[
+        "presses by location",
+        "1 to 2 presses at a location",
+        "--despite location-shares",
+    ]);
 
     let fault = ["--fault", "robot-z-high@contact:3"];
     let (c, d) = (

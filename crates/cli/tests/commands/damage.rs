@@ -38,13 +38,78 @@ fn measured_positions_that_the_poses_contradict_are_reported() {
     let path = text(&session);
     let sound = skinrig(&["verify", &path]).code(0).out;
     assert!(sound.contains("sound, but not sealed"), "{sound}");
+    let verdict = "UPDATE attempt SET verdict = 'missed', reason = 'unlucky' WHERE press = 3";
+    change(&session, verdict);
+    let missed = skinrig(&["verify", &path]).code(4).out;
+    assert!(missed.contains("never attempted"), "{missed}");
     change(
         &session,
-        "UPDATE attempt SET measured_y_mm = measured_y_mm + 0.3 WHERE press = 3",
+        "UPDATE attempt SET verdict = 'valid', reason = NULL WHERE press = 3",
     );
-    let found = skinrig(&["verify", &path]).code(4);
-    let all = format!("{}{}", found.out, found.err);
-    assert!(all.contains("of its poses"), "{all}");
+    macro_rules! edit {
+        ($column:literal, $change:literal) => {
+            concat!(
+                "UPDATE attempt SET ",
+                $column,
+                " = ",
+                $column,
+                " ",
+                $change,
+                " WHERE press = 3"
+            )
+        };
+    }
+    for (edit, undo, part) in [
+        (
+            edit!("measured_depth_mm", "+ 0.3"),
+            edit!("measured_depth_mm", "- 0.3"),
+            "the depth",
+        ),
+        (
+            edit!("contact_ns", "+ 3000000"),
+            edit!("contact_ns", "- 3000000"),
+            "contact where the poses cross",
+        ),
+        (
+            edit!("release_ns", "+ 10000000"),
+            edit!("release_ns", "- 10000000"),
+            "release where the poses cross",
+        ),
+        (
+            edit!("at_depth_ns", "+ 20000000"),
+            edit!("at_depth_ns", "- 20000000"),
+            "poses have settled",
+        ),
+        (
+            edit!("at_depth_ns", "- 10000000"),
+            edit!("at_depth_ns", "+ 10000000"),
+            "poses have settled",
+        ),
+        (
+            edit!("retract_ns", "- 20000000"),
+            edit!("retract_ns", "+ 20000000"),
+            "set point begins to rise",
+        ),
+        (
+            edit!("retract_ns", "+ 10000000"),
+            edit!("retract_ns", "- 10000000"),
+            "set point begins to rise",
+        ),
+        (
+            edit!("scheduled", "+ 1"),
+            edit!("scheduled", "- 1"),
+            "those of a schedule",
+        ),
+        (edit!("measured_y_mm", "+ 0.3"), "", "of its poses"),
+    ] {
+        change(&session, edit);
+        let found = skinrig(&["verify", &path]).code(4);
+        let all = format!("{}{}", found.out, found.err);
+        assert!(all.contains(part), "{edit}: {all}");
+        if !undo.is_empty() {
+            change(&session, undo);
+        }
+    }
     // No seal makes it sound again.
     assert_ne!(skinrig(&["resume", &path]).code, Some(0));
 }

@@ -69,6 +69,17 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
         assert!(stored == events(camera), "{camera}");
     }
     skinrig(&["verify", &text(&session)]).code(0);
+
+    // The same files once more are no second measurement.
+    skinrig(&data.arguments(&lab.path("again"))).code(0);
+    let again = text(&only(&lab.path("again"), ".session.sqlite"));
+    skinrig(&["compare", &text(&session), &again])
+        .code(2)
+        .expect_stderr(&[
+            "the same recording",
+            "on both sides",
+            "--despite same-session",
+        ]);
 }
 
 /// Imports the dataset with changed positions or swapped cameras; returns output and results.

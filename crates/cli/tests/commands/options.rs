@@ -145,6 +145,10 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
     skinrig(&["analyze", &session, "--max-rmse", &above]).code(0);
     let below = (rmse - 0.01).to_string();
     skinrig(&["analyze", &session, "--max-rmse", &below]).code(4);
+    // Without an analysis no limit is met.
+    skinrig(&["run", SMALL, "--no-analysis", "--max-rmse", "100"])
+        .code(2)
+        .expect_stderr(&["--max-rmse", "--no-analysis"]);
     for nonsense in ["NaN", "-1", "two"] {
         skinrig(&["analyze", &session, &format!("--max-rmse={nonsense}")])
             .code(2)
@@ -213,6 +217,48 @@ fn a_session_whose_clocks_are_beyond_a_limit_is_invalid_everywhere() {
     skinrig(&["online", &invalid])
         .code(4)
         .expect_stderr(&["expected a valid session, found an INVALID one", "next:"]);
+    skinrig(&[
+        "export",
+        &invalid,
+        "--to",
+        "bundle",
+        "--out",
+        &lab.text("b"),
+    ])
+    .code(4)
+    .expect_stderr(&["INVALID, do not use the exported numbers", "next:"]);
+    skinrig(&["verify", &lab.text("b")]).code(0);
+    let plan = skinrig(&["plan", "--from", &invalid, "--detect", "1 mm"]).code(4);
+    assert!(
+        plan.out.is_empty() && plan.err.contains("INVALID"),
+        "{plan:?}"
+    );
+}
+
+/// Nothing located is no result.
+#[test]
+fn a_session_in_which_no_press_counts_is_invalid() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let all = "analysis.exclude_press_numbers=[3, 4, 5, 6, 7, 8, 9, 10]";
+    let none = skinrig(&["analyze", &session, "--json", "--set", all]).code(4);
+    assert_eq!(none.json()["valid"], false);
+    let document = none.json();
+    let warnings = document["analysis"]["warnings"].as_array().unwrap();
+    let nothing = warnings.iter().find(|w| w["kind"] == "nothing_counts");
+    assert_eq!(nothing.unwrap()["excluded"], 8, "{warnings:#?}");
+    none.expect_stderr(&[
+        "expected at least one of 8 presses to count, found none",
+        "next:",
+    ]);
+    for (wrong, part) in [("[11]", "which has 10"), ("[1]", "never score")] {
+        let set = format!("analysis.exclude_press_numbers={wrong}");
+        skinrig(&["analyze", &session, "--set", &set])
+            .code(2)
+            .expect_stderr(&["exclude_press_numbers", part]);
+    }
+    let one = "analysis.exclude_press_numbers=[4, 5, 6, 7, 8, 9, 10]";
+    skinrig(&["analyze", &session, "--set", one]).code(0);
 }
 
 #[test]

@@ -16,8 +16,16 @@ fn a_session_is_analysed_with_an_earlier_calibration_or_the_reason_is_given() {
         ];
         text(&lab.record(folder, &[&calibrates, more].concat()))
     };
-    let earlier = record("a", &["--seed", "1"]);
-    // The seed also numbers the simulated cameras.
+    // The seed also numbers the simulated cameras, and makes the same noise at the same presses.
+    let elsewhere = [
+        "--seed",
+        "1",
+        "--set",
+        "path.points=[[8 mm, 4 mm], [-8 mm, 16 mm], [2 mm, -16 mm], [22 mm, 15 mm], [12 mm, 12 mm], [-4 mm, 2 mm]]",
+        "--set",
+        "sync.at=[14 mm, 6 mm]",
+    ];
+    let earlier = record("a", &elsewhere);
     let later = record("b", &["--seed", "1"]);
     let replaced = record("d", &["--seed", "2"]);
     let other = record("c", &["--set", "prototype.id=skin 9"]);
@@ -58,4 +66,59 @@ fn a_session_is_analysed_with_an_earlier_calibration_or_the_reason_is_given() {
     assert!(cameras.err.contains("sim-00000002-c1"), "{cameras:#?}");
     let other = analyze(&later, &other).code(2);
     assert!(other.err.contains("found `skin 9`"), "{other:#?}");
+    // The tip and the cameras' settings are those of the earlier session.
+    let changed = |folder: &str, set: &str| {
+        let session = record(folder, &[&elsewhere[..], &["--set", set]].concat());
+        analyze(&later, &session).code(2)
+    };
+    let tip = changed("e", "prototype.tip=sphere 5 mm");
+    assert!(
+        tip.err.contains("the tip `cube`, found `sphere 5 mm`"),
+        "{tip:#?}"
+    );
+    let biases = changed("f", "cameras.camera1.biases.bias_fo=1600");
+    assert!(
+        biases.err.contains("bias_fo 1477, found 1600"),
+        "{biases:#?}"
+    );
+}
+
+/// Scored presses of a session do not calibrate it under another name.
+#[test]
+fn a_session_is_not_calibrated_by_its_own_events() {
+    let lab = Lab::new();
+    let calibrates = [
+        "--set",
+        "evaluation.calibrate=[1]",
+        "--set",
+        "evaluation.score=[2]",
+        "--set",
+        "analysis.calibration=positions",
+    ];
+    let session = text(&lab.record("a", &calibrates));
+    let replays = lab.text("replays");
+    skinrig(&[
+        "run",
+        "--replay",
+        &session,
+        "--sessions",
+        &replays,
+        "--no-analysis",
+    ])
+    .code(0);
+    let replay = text(&only(&lab.path("replays"), ".session.sqlite"));
+    // The same presses, recorded once more with the same noise, and more of them.
+    let again = text(&lab.record("b", &calibrates));
+    let longer = [
+        "--set",
+        "repetitions.count=3",
+        "--set",
+        "evaluation.score=[2, 3]",
+    ];
+    let longer = text(&lab.record("c", &[&calibrates[..2], &longer, &calibrates[4..]].concat()));
+    for other in [&replay, &again, &longer] {
+        skinrig(&["analyze", &session, "--calibration-from", other])
+            .code(2)
+            .expect_stderr(&["of the same events", "next:"]);
+    }
 }

@@ -1,24 +1,22 @@
 //! Owns checks that need more than one fact: shared locations and depths, alignment, results, duplicate sessions.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use skinrig_analysis::result::AlignmentStatus;
 use skinrig_model::Reaction;
 
 use super::camera_checks::{ambient, cameras};
-use super::difference::{Difference, Severity, difference};
+use super::difference::{Difference, Severity, as_blocking, difference};
+use super::share_checks::shares;
 use crate::locations::Locations;
 use crate::subject::{Session, Subject, join_values};
-
-/// Larger differences between the shares of presses at a depth do not come from a few failed presses.
-const MAX_DEPTH_SHARE_DIFFERENCE: f64 = 0.1;
 
 pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference> {
     let mut found = Vec::new();
     found.extend(check_alignment(subjects));
     found.extend(check_results(subjects, locations));
     found.extend(check_depths(subjects, locations));
-    found.extend(check_depth_shares(subjects, locations));
+    found.extend(shares(subjects, locations));
     found.extend(check_prototypes(subjects));
     found.extend(check_planted(subjects));
     found.extend(check_stopped(subjects));
@@ -30,12 +28,6 @@ pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference
     found.extend(ambient(subjects, locations));
     found.extend(cameras(subjects));
     found
-}
-
-fn as_blocking(mut difference: Difference, next: &str) -> Difference {
-    difference.severity = Severity::Blocking;
-    difference.next = Some(next.to_owned());
-    difference
 }
 
 fn each(subjects: &[Subject], of: impl Fn(&Session) -> String) -> Vec<String> {
@@ -130,49 +122,6 @@ fn check_depths(subjects: &[Subject], locations: &Locations) -> Option<Differenc
         Severity::Harmless,
         values,
         reason,
-    ))
-}
-
-/// Errors depend on the depth, and a skin's figure is that of all its presses at the shared depths.
-fn check_depth_shares(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
-    let shares = |s: &Subject| -> BTreeMap<i64, f64> {
-        let mut counts = BTreeMap::new();
-        for press in locations.attempts(s) {
-            let um = (press.press.depth_mm * 1e3).round() as i64;
-            *counts.entry(um).or_insert(0.0) += 1.0;
-        }
-        let all: f64 = counts.values().sum();
-        counts.into_iter().map(|(um, n)| (um, n / all)).collect()
-    };
-    let shares: Vec<BTreeMap<i64, f64>> = subjects.iter().map(shares).collect();
-    let of = |s: &BTreeMap<i64, f64>, um: &i64| s.get(um).copied().unwrap_or(0.0);
-    let differs = shares.iter().any(|own| {
-        !own.is_empty()
-            && own
-                .iter()
-                .any(|(um, share)| (share - of(&shares[0], um)).abs() > MAX_DEPTH_SHARE_DIFFERENCE)
-    });
-    if !differs || shares[0].is_empty() {
-        return None;
-    }
-    let text = |s: &BTreeMap<i64, f64>| {
-        let each = s
-            .iter()
-            .map(|(um, share)| format!("{:.0} % at {} mm", 100.0 * share, *um as f64 * 1e-3));
-        each.collect::<Vec<_>>().join(", ")
-    };
-    let values = shares.iter().map(text).collect();
-    let reason =
-        "deeper presses have other errors, so the skin pressed deeper more often looks different";
-    Some(as_blocking(
-        difference(
-            "depth-shares",
-            "presses by depth",
-            Severity::Blocking,
-            values,
-            reason,
-        ),
-        "press both skins equally often at each depth, or select sessions of one depth",
     ))
 }
 
@@ -300,33 +249,42 @@ fn check_locations(subjects: &[Subject], locations: &Locations) -> Option<Differ
 }
 
 fn check_duplicates(subjects: &[Subject]) -> Option<Difference> {
-    let ids: Vec<&str> = subjects
-        .iter()
-        .flat_map(|s| s.sessions.iter().map(|s| s.facts.session_id.as_str()))
-        .collect();
-    let different: BTreeSet<&str> = ids.iter().copied().collect();
-    (different.len() < ids.len()).then(|| {
-        let values = each(subjects, |s| s.facts.session_id.chars().take(8).collect());
-        let sides = |id: &str| {
-            let has = |s: &&Subject| s.sessions.iter().any(|s| s.facts.session_id == id);
-            subjects.iter().filter(has).count()
-        };
-        let reason = if different.iter().any(|id| sides(id) > 1) {
-            "the same session, or a copy of it, is on both sides: its noise is not independent"
-        } else {
-            "the same session, or a copy of it, is twice on one side: its noise is not independent"
-        };
-        as_blocking(
-            difference(
-                "same-session",
-                "session",
-                Severity::Blocking,
-                values,
-                reason,
-            ),
-            "name each session once",
-        )
-    })
+    let all = || {
+        let sides = subjects.iter().enumerate();
+        sides.flat_map(|(side, s)| s.sessions.iter().map(move |s| (side, &s.facts)))
+    };
+    // Sides of each pair of sessions with the same recording.
+    let mut pairs = Vec::new();
+    for (k, (side, a)) in all().enumerate() {
+        let later = all().skip(k + 1);
+        let same = later.filter(|(_, b)| {
+            a.session_id == b.session_id || (!a.is_simulated() && a.is_same_recording(b))
+        });
+        pairs.extend(same.map(|(other, b)| (side != other, a.session_id == b.session_id)));
+    }
+    let (between_sides, same_id) = *pairs.iter().max()?;
+    let values = each(subjects, |s| s.facts.session_id.chars().take(8).collect());
+    let what = if same_id {
+        "the same session, or a copy of it,"
+    } else {
+        "the same recording, imported or replayed twice,"
+    };
+    let place = if between_sides {
+        "is on both sides"
+    } else {
+        "is twice on one side"
+    };
+    let reason = format!("{what} {place}: its noise is not independent");
+    Some(as_blocking(
+        difference(
+            "same-session",
+            "session",
+            Severity::Blocking,
+            values,
+            &reason,
+        ),
+        "name each session once",
+    ))
 }
 
 fn check_seeds(subjects: &[Subject]) -> Option<Difference> {

@@ -69,3 +69,10 @@ pub(super) fn difference(
         overridden: false,
     }
 }
+
+/// The difference as one that blocks, with the next step.
+pub(super) fn as_blocking(mut difference: Difference, next: &str) -> Difference {
+    difference.severity = Severity::Blocking;
+    difference.next = Some(next.to_owned());
+    difference
+}

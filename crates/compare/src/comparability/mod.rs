@@ -9,6 +9,7 @@ mod checks;
 mod difference;
 mod label;
 mod rules;
+mod share_checks;
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -156,6 +156,23 @@ pub(crate) fn outcome(attempt: AttemptId, t: i64, verdict: PressVerdict) -> Pres
     }
 }
 
+/// Height of the tip so many milliseconds after the start of an attempt: what [`outcome`] states follows from it.
+fn height_mm(ms: i64) -> f64 {
+    match ms {
+        ..=3 | 16.. => 5.0,
+        4 => -1e-4,
+        14 => -2.0,
+        15 => 1e-4,
+        _ => -2.002,
+    }
+}
+
+/// The set point rises with the retraction.
+fn set_point(target: Point3<Skin>, ms: i64) -> Point3<Skin> {
+    let rise_mm = if ms < 12 { 0.0 } else { 5.0 };
+    Point3::new(target.x_mm, target.y_mm, target.z_mm + rise_mm)
+}
+
 /// One report of each kind; the reset comes first, where it separates nothing.
 fn box_reports(mark: Mark, t: HostTime, k: u64) -> Vec<BoxReport> {
     let at = |us: u64| BoxTime {
@@ -381,8 +398,8 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
             (0..20)
                 .map(|ms| PoseSample {
                     t: t + HostDuration::from_millis(ms),
-                    commanded: target,
-                    measured: Point3::new(1.0 / 3.0, -4.0, 5.0),
+                    commanded: set_point(target, ms),
+                    measured: Point3::new(1.0 / 3.0, -4.0, height_mm(ms)),
                     force_n: f64::NAN,
                 })
                 .collect(),

@@ -62,7 +62,7 @@ impl EarlierCalibration {
     /// # Errors
     /// [`RecalibrationError`] if the session is INVALID or has no calibration.
     pub fn new(session: EarlierSession, analysis: &Analysis) -> Result<Self, RecalibrationError> {
-        if !analysis.is_valid() {
+        if !analysis.may_calibrate() {
             return Err(RecalibrationError::EarlierInvalid {
                 because: analysis.invalid_because(),
             });

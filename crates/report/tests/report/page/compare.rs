@@ -1,6 +1,6 @@
 //! A comparison and a tradeoff on a terminal and as pages.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use skinrig_analysis::tradeoff::{Choice, Cost, Predictions, Region, Row, Tradeoff};
 use skinrig_compare::{
@@ -41,6 +41,7 @@ fn subject(letter: char, scale: f64, values: &[(&str, &str)]) -> Subject {
         rig_name: "simulated (geometric)".to_owned(),
         values: values.collect::<BTreeMap<_, _>>(),
         docs: BTreeMap::new(),
+        chunks: BTreeSet::new(),
     };
     Subject {
         letter,
