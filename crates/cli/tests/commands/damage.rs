@@ -76,23 +76,23 @@ fn measured_positions_that_the_poses_contradict_are_reported() {
             "release where the poses cross",
         ),
         (
-            edit!("at_depth_ns", "+ 20000000"),
-            edit!("at_depth_ns", "- 20000000"),
+            edit!("at_depth_ns", "+ 40000000"),
+            edit!("at_depth_ns", "- 40000000"),
             "poses have settled",
         ),
         (
-            edit!("at_depth_ns", "- 10000000"),
-            edit!("at_depth_ns", "+ 10000000"),
+            edit!("at_depth_ns", "- 30000000"),
+            edit!("at_depth_ns", "+ 30000000"),
             "poses have settled",
         ),
         (
-            edit!("retract_ns", "- 20000000"),
-            edit!("retract_ns", "+ 20000000"),
+            edit!("retract_ns", "- 40000000"),
+            edit!("retract_ns", "+ 40000000"),
             "set point begins to rise",
         ),
         (
-            edit!("retract_ns", "+ 10000000"),
-            edit!("retract_ns", "- 10000000"),
+            edit!("retract_ns", "+ 30000000"),
+            edit!("retract_ns", "- 30000000"),
             "set point begins to rise",
         ),
         (

@@ -15,8 +15,10 @@ use crate::rows::AttemptRow;
 const SETTLING_MM: f64 = 0.1;
 /// The touched surface is where the path is at the contact: larger distances, mm, have another reason than rounded times.
 const TOUCH_MM: f64 = 0.02;
-/// Contact and release are where the path crosses the surface: larger differences have another reason than rounded times.
-const ROUNDING: HostDuration = HostDuration::from_micros(10);
+/// Contact and release are where the path crosses the surface: larger differences have another reason than noise of the poses.
+const CROSSING: HostDuration = HostDuration::from_millis(2);
+/// At depth and retract begin at samples: larger differences have another reason than a few samples more or less.
+const PHASE: HostDuration = HostDuration::from_millis(20);
 /// A set point that changes by more than this between two samples moves, mm; see the controller.
 const MOVED_MM: f64 = 1e-3;
 /// Fewer samples make no mean.
@@ -65,9 +67,12 @@ pub(super) fn check_truth(reader: &SessionReader, report: &mut VerifyReport) {
                 continue;
             }
             path.check_values(&attempt, (&outcome, timing), hold, report);
+            // The path of a press that a fault broke off has other phases.
+            if outcome.verdict != PressVerdict::Valid {
+                continue;
+            }
             path.check_times(&attempt, (&outcome, timing), report);
-            let settled = limits.filter(|_| outcome.verdict == PressVerdict::Valid);
-            if let Some(limits) = settled {
+            if let Some(limits) = limits {
                 path.check_settled(&attempt, &planned, (&outcome, timing), limits, report);
             }
         }
@@ -201,7 +206,7 @@ impl Path {
             let Some(expected) = crossing else {
                 continue;
             };
-            if (found - expected).0.abs() > ROUNDING.0 {
+            if (found - expected).0.abs() > CROSSING.0 {
                 report.mismatch(
                     attempt.id,
                     format!("{what} where the poses cross the surface, at {expected}"),
@@ -209,22 +214,27 @@ impl Path {
                 );
             }
         }
-        let up_to = self.between(timing.at_depth, timing.retract);
-        let Some((last, hold)) = up_to.split_last() else {
-            return;
-        };
-        let set_points = || hold.iter().map(|s| s.commanded.z_mm);
-        let lowest = set_points().fold(f64::INFINITY, f64::min);
-        let mut rising = set_points().skip_while(|z| *z > lowest);
-        let begins =
-            last.commanded.z_mm > lowest + MOVED_MM && rising.all(|z| z <= lowest + MOVED_MM);
-        if !begins {
+        let found = timing.retract;
+        if let Some(rise) = self.rise(timing.at_depth, timing.clear, surface_mm)
+            && (found - rise).0.abs() > PHASE.0
+        {
             report.mismatch(
                 attempt.id,
-                "a retraction when the set point begins to rise",
-                format!("one at {}", timing.retract),
+                format!("a retraction when the set point begins to rise, at {rise}"),
+                format!("one at {found}"),
             );
         }
+    }
+
+    /// When the set point begins the rise that lifts it above the surface. One of a press that stopped when it was felt has moved before.
+    fn rise(&self, from: HostTime, to: HostTime, surface_mm: f64) -> Option<HostTime> {
+        let samples = self.between(from, to);
+        let lifted = samples.iter().position(|s| s.commanded.z_mm > surface_mm)?;
+        samples[..lifted].iter().rev().find_map(|s| {
+            let before = samples.partition_point(|b| b.t < s.t - PHASE);
+            let risen_mm = s.commanded.z_mm - samples[before].commanded.z_mm;
+            (risen_mm <= MOVED_MM).then_some(s.t)
+        })
     }
 
     /// The tip is at depth once it has been within the tolerance for the settle time.
@@ -256,7 +266,7 @@ impl Path {
             both.map(|s| s.t)
                 .find(|t| *t - since.t >= limits.settle_time)
         });
-        if settled != Some(timing.at_depth) {
+        if settled.is_none_or(|t| (t - timing.at_depth).0.abs() > PHASE.0) {
             report.mismatch(
                 attempt.id,
                 "the tip at depth once its poses have settled",
