@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
+use skinrig_analysis::{Analysis, results_hash};
 
 use crate::dataset::Dataset;
 use crate::support::{Lab, only, read_json, show, skinrig, text};
@@ -59,13 +60,16 @@ fn programs_find_the_evidence_of_a_finding_by_kind() {
     assert!(evidence["log_odds"].as_f64().unwrap() > 10.0, "{evidence}");
 }
 
-/// Replaces the violations in stored results.
+/// Replaces the violations in stored results, and their hash if this version reads them.
 fn set_violations(results: &Path, version: u64, violations: Value) {
     let mut document = read_json(results);
     document["analysis"]["version"] = version.into();
     document["summary"]["analysis_version"] = version.into();
     document["analysis"]["alignment"]["status"] = "invalid".into();
     document["analysis"]["alignment"]["violations"] = violations;
+    if let Ok(analysis) = serde_json::from_value::<Analysis>(document["analysis"].clone()) {
+        document["provenance"]["results_hash"] = results_hash(&analysis).into();
+    }
     std::fs::write(results, serde_json::to_string_pretty(&document).unwrap()).unwrap();
 }
 
