@@ -164,6 +164,9 @@ pub fn judge(case: &Case, seed: u64) -> CaseVerdict {
         (false, None, _) if !analysis.alignment.is_usable() => {
             Observed::Refused(texts(&analysis.alignment.violations).join("; "))
         }
+        (false, None, None) if analysis.may_calibrate() => {
+            Observed::Refused(analysis.invalid_because().join("; "))
+        }
         (false, None, _) => {
             let faults: Vec<Fault> = analysis.findings.iter().map(|f| f.fault).collect();
             if faults == [Fault::Unknown] {
