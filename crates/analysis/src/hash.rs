@@ -12,8 +12,8 @@ use skinrig_model::{
     AnalysisSettings, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry, Verdict,
 };
 
-/// Content of the digest: settings, geometry, table of presses, metrics, and whether they may be used. It excludes absolute times, so that a replay at
-/// another time has the same digest, and texts, so that a reworded message does not change it.
+/// Content of the digest: settings, geometry, table of presses, metrics, and whether they may be used. It excludes absolute times,
+/// so that a replay at another time has the same digest, and texts, so that a reworded message does not change it.
 #[derive(Serialize)]
 struct Results<'a> {
     version: u32,

@@ -22,8 +22,8 @@ use crate::shared_events::{event_runs, shared};
 /// presses.
 const SAME_EVENTS: f64 = 0.25;
 
-/// Analyses the session at `path` as far as its calibration, with the settings of `session`, whose events are `events`, so that the columns of both mean
-/// the same. Presses that the earlier protocol excludes by hand stay excluded.
+/// Analyses the session at `path` as far as its calibration, with the settings of `session`, whose events are `events`, so that the
+/// columns of both mean the same. Presses that the earlier protocol excludes by hand stay excluded.
 ///
 /// # Errors
 /// [`ResultsError::Earlier`] if it cannot be about the same skin and cameras; else as for any analysis.

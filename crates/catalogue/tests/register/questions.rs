@@ -1,4 +1,4 @@
-//! Every question has the answer that the entries give; at 10,000 sessions each takes less than 200 ms.
+//! Every question has the answer that the entries give.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};

@@ -15,7 +15,7 @@ fn session(lab: &Lab) -> String {
 }
 
 /// Its settings.
-const USUAL: [&str; 10] = [
+pub(crate) const USUAL: [&str; 10] = [
     "--set",
     "repetitions.count=4",
     "--set",

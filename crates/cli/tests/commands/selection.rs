@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::online::USUAL;
 use crate::support::{Lab, SMALL, files, only, read_json, skinrig, text};
 
 /// A recorded and analysed session.
@@ -264,19 +265,7 @@ fn a_selection_that_does_not_fit_is_rejected_where_it_is_wrong() {
 #[test]
 fn selections_of_one_session_are_replayed_and_given_away() {
     let lab = Lab::new();
-    let teach = [
-        "--set",
-        "repetitions.count=4",
-        "--set",
-        "evaluation.calibrate=[1, 2, 3]",
-        "--set",
-        "evaluation.score=[4]",
-        "--set",
-        "analysis.calibration=positions",
-        "--set",
-        "analysis.bootstrap_resamples=50",
-    ];
-    let session = recorded(&lab, "s", &teach);
+    let session = recorded(&lab, "s", &USUAL);
     let official = read_json(&only(&lab.path("s"), ".results.json"));
     let presses = official["analysis"]["presses"].as_array().unwrap();
     let scored: Vec<u64> = presses
