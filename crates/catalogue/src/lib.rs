@@ -22,6 +22,7 @@ mod prototypes;
 mod question;
 mod questions;
 mod results;
+pub mod results_digest;
 mod schema;
 mod status;
 mod value;

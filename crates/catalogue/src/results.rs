@@ -9,6 +9,7 @@ use serde::de::IgnoredAny;
 use skinrig_recorder::SESSION_SUFFIX;
 
 use crate::press::{self, Press, PressEntry};
+use crate::results_digest;
 
 /// Precedes the variant's name in its file names.
 pub const ANALYSIS_MARK: &str = ".analysis-";
@@ -251,6 +252,7 @@ fn figures(
     std::fs::File::open(path)
         .and_then(|file| file.take(MOST_BYTES).read_to_end(&mut text))
         .map_err(|e| e.to_string())?;
+    results_digest::check(&text).map_err(|e| e.to_string())?;
     let found: Document = serde_json::from_slice(&text).map_err(|e| {
         format!("results of another version of skinrig: analyze the session again ({e})")
     })?;

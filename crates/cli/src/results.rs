@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use skinrig_analysis::digits::Digits;
 use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, LegStart};
+use skinrig_catalogue::results_digest;
 use skinrig_report::{Provenance, ReportInput, SelectionEffect, Variant};
 use skinrig_results::{AlignedSession, AnalyzedSession, Session};
 
@@ -175,7 +176,8 @@ pub(crate) fn documents(results: &Results) -> Result<(String, String), Failure> 
         || serde_json::to_string_pretty(&skinrig_report::json(&input)),
         || skinrig_report::html(&input),
     );
-    Ok((json.map_err(Failure::internal)?, html))
+    let json = results_digest::with_digest(&json.map_err(Failure::internal)?);
+    Ok((json, html))
 }
 
 /// Writes a whole file or none: a full disk leaves no partial file.

@@ -1,5 +1,8 @@
 //! Registering sessions: the same rows as in the files, once, and what is stale.
 
+use std::path::Path;
+
+use skinrig_catalogue::results_digest::with_digest;
 use skinrig_catalogue::{Access, Address, Catalogue, Registration, Staleness};
 use skinrig_recorder::{Annotation, SessionReader, annotate, salvage};
 
@@ -50,15 +53,21 @@ fn results(of: &SessionReader, rmse_mm: f64, variant: Option<&str>) -> String {
           "provenance": {{"session_id": "{session_id}", "content_sha256": "{content}", "results_hash": "abc", "variant": {variant}}},
           "summary": {{"session_id": "{session_id}", "content_sha256": "{content}", "analysis_version": 14, "results_hash": "abc",
             "valid": true, "counts": {{}}, "rmse_mm": {{"value": {rmse_mm}, "low": 1.0, "high": 2.0, "n": 8}},
-            "repeat_std_mm": {{"n": 0}}, "located_rate": {{"n": 0}}}}, "valid": true}}"#
+            "repeat_std_mm": {{"n": 0}}, "located_rate": {{"n": 0}}}}, "valid": true
+}}"#
     )
+}
+
+/// Writes a results file with its digest.
+fn write(file: impl AsRef<Path>, results: &str) {
+    std::fs::write(file, with_digest(results)).unwrap();
 }
 
 /// Writes official results of the session `n`.
 pub(crate) fn write_results(lab: &Lab, n: u32) {
     let reader = SessionReader::open(lab.session(n)).unwrap();
     let file = lab.path().join(format!("{n}.results.json"));
-    std::fs::write(file, results(&reader, 1.5, None)).unwrap();
+    write(file, &results(&reader, 1.5, None));
 }
 
 /// Adds a tag and a note to the session `n`.
@@ -82,7 +91,7 @@ fn a_session_is_registered_as_it_is_in_its_file_and_once() {
     let id = reader.session_id().unwrap();
     write_results(&lab, 1);
     let variant = lab.path().join("1.analysis-bin=2px.results.json");
-    std::fs::write(variant, results(&reader, 1.25, Some("bin=2px"))).unwrap();
+    write(variant, &results(&reader, 1.25, Some("bin=2px")));
     add_tag(&lab, 1);
 
     let done = lab.open().register(&[lab.session(1)]).unwrap();
@@ -187,7 +196,7 @@ fn results_of_an_earlier_content_are_a_problem() {
     let reader = SessionReader::open(lab.session(0)).unwrap();
     let content = reader.seal().unwrap().unwrap().content_sha256();
     let older = results(&reader, 1.5, None).replace(&content, &"0".repeat(64));
-    std::fs::write(lab.path().join("0.results.json"), older).unwrap();
+    write(lab.path().join("0.results.json"), &older);
     lab.open().register(&[lab.session(0)]).unwrap();
     let sql = "SELECT rmse_mm, problem FROM analysis";
     let expected = "rmse_mm=null|problem=the results are older than the session: analyze it again";
@@ -201,10 +210,24 @@ fn results_of_an_earlier_content_are_a_problem() {
             "0",
         ),
     ] {
-        std::fs::write(lab.path().join("0.results.json"), text).unwrap();
+        write(lab.path().join("0.results.json"), &text);
         assert_eq!(refresh(&lab).registered.len(), 1);
         assert_eq!(column(&lab.file(), "SELECT count(*) FROM press"), [count]);
     }
+}
+
+/// An RMSE that was edited by hand is no result.
+#[test]
+fn results_that_were_changed_are_a_problem() {
+    let lab = Lab::with_sessions(1);
+    write_results(&lab, 0);
+    let file = lab.path().join("0.results.json");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("\"value\": 1.5", "\"value\": 0.5")).unwrap();
+    lab.open().register(&[lab.session(0)]).unwrap();
+    let expected = "rmse_mm=null|problem=the results were changed after they were written: analyze the session again";
+    let found = rows(&lab.file(), "SELECT rmse_mm, problem FROM analysis");
+    assert_eq!(found, [expected]);
 }
 
 /// Results that contradict themselves are a problem of their session alone: the others are registered.
@@ -229,7 +252,7 @@ fn results_with_rows_twice_are_a_problem() {
     ] {
         let bad = good.replace(one, other);
         assert_ne!(bad, good);
-        std::fs::write(lab.path().join("0.results.json"), bad).unwrap();
+        write(lab.path().join("0.results.json"), &bad);
         let done = lab.open().refresh(lab.path(), true).unwrap();
         assert_eq!(
             (done.registered.len(), done.unreadable.len()),
@@ -241,8 +264,8 @@ fn results_with_rows_twice_are_a_problem() {
         assert_eq!(column(&lab.file(), "SELECT count(*) FROM press"), ["0"]);
     }
     // A file whose name pretends to be a variant called `official`.
-    std::fs::write(lab.path().join("0.results.json"), &good).unwrap();
-    std::fs::write(lab.path().join("0.analysis-official.results.json"), &good).unwrap();
+    write(lab.path().join("0.results.json"), &good);
+    write(lab.path().join("0.analysis-official.results.json"), &good);
     let done = lab.open().refresh(lab.path(), false).unwrap();
     assert_eq!(done.registered.len(), 1);
     assert_eq!(column(&lab.file(), problem), ["null"]);

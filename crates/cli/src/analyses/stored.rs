@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use skinrig_analysis::locator::FittedLocator;
 use skinrig_analysis::{ANALYSIS_VERSION, Analysis, results_hash};
+use skinrig_catalogue::results_digest;
 
 use super::{content_of, results_path};
 
@@ -45,6 +46,7 @@ pub(crate) fn stored_of(
     name: Option<&str>,
 ) -> Option<Analysis> {
     let text = std::fs::read(results_path(session, name)).ok()?;
+    results_digest::check(&text).ok()?;
     // Another version may have other fields, and then does not parse.
     let found: Document = serde_json::from_slice(&text).ok()?;
     let variant = found.provenance.variant.map(|v| v.name);

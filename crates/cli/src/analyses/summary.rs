@@ -1,16 +1,17 @@
 //! Reads the summary at the end of a results file.
 
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::fs;
+use std::io;
 use std::path::Path;
 
 use serde::Deserialize;
+use skinrig_catalogue::results_digest::{self, DigestError};
 use skinrig_report::Summary;
 
 use super::{content_of, results_path};
 
 /// The summary is within this many bytes of the end of a results file.
-const TAIL_BYTES: u64 = 1 << 16;
+const TAIL_BYTES: usize = 1 << 16;
 
 /// Why the results of an analysis beside a session cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +47,9 @@ pub(crate) enum SummaryError {
     /// The results have no summary, or one that does not parse.
     #[error("results of an older skinrig: analyze the session again")]
     Older(#[source] Option<serde_json::Error>),
+    /// The file has no digest, or that of another content.
+    #[error(transparent)]
+    Changed(#[from] DigestError),
     /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -83,14 +87,12 @@ pub(crate) fn summary(
 }
 
 fn read_summary(path: &Path) -> Result<Summary, SummaryError> {
-    let mut file = File::open(path).map_err(|e| match e.kind() {
+    let text = fs::read(path).map_err(|e| match e.kind() {
         io::ErrorKind::NotFound => SummaryError::NotAnalysed,
         _ => e.into(),
     })?;
-    let length = file.metadata()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES)))?;
-    let mut tail = Vec::new();
-    file.take(TAIL_BYTES).read_to_end(&mut tail)?;
+    results_digest::check(&text)?;
+    let tail = &text[text.len().saturating_sub(TAIL_BYTES)..];
     // A key of the outermost object: a JSON string never contains a line break.
     let key = b"\n  \"summary\": ";
     let at = tail.windows(key.len()).position(|w| w == key);

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use skinrig_analysis::{Analysis, results_hash};
 
 use crate::dataset::Dataset;
-use crate::support::{Lab, only, read_json, show, skinrig, text};
+use crate::support::{Lab, only, read_json, show, skinrig, text, write_results};
 
 fn of_kind<'a>(causes: &'a Value, kind: &str) -> &'a Value {
     let mut causes = causes.as_array().unwrap().iter();
@@ -70,7 +70,7 @@ fn set_violations(results: &Path, version: u64, violations: Value) {
     if let Ok(analysis) = serde_json::from_value::<Analysis>(document["analysis"].clone()) {
         document["provenance"]["results_hash"] = results_hash(&analysis).into();
     }
-    std::fs::write(results, serde_json::to_string_pretty(&document).unwrap()).unwrap();
+    write_results(results, document);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::json::shape;
-use crate::support::{Lab, SMALL, files, only, skinrig, text};
+use crate::support::{Lab, SMALL, files, only, show, skinrig, text, write_results};
 
 /// Records a small session of a skin and returns its path.
 fn record(lab: &Lab, folder: &str, seed: &str, more: &[&str]) -> String {
@@ -23,6 +23,34 @@ fn table(a: &str, b: &str) -> Value {
     compared.code(0).json()["table"].clone()
 }
 
+/// Lists read the summary alone, which no hash of the results covers.
+#[test]
+fn a_summary_that_was_edited_is_not_listed() {
+    let lab = Lab::new();
+    let session = record(&lab, "a", "1", &[]);
+    skinrig(&["analyze", &session]).code(0);
+    let rmse = || show(session.as_ref())["analyses"][0]["rmse_mm"]["value"].clone();
+    let measured = rmse().as_f64().unwrap();
+    let path = only(&lab.path("a"), ".results.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (head, summary) = text.rsplit_once("\n  \"summary\": ").unwrap();
+    let better = summary.replace(&measured.to_string(), "0.125");
+    assert_ne!(better, summary);
+    std::fs::write(&path, format!("{head}\n  \"summary\": {better}")).unwrap();
+    assert_eq!(rmse(), Value::Null);
+    for list in [&["show", &session][..], &["sessions", &lab.text("a")]] {
+        let listed = skinrig(list).code(0).out;
+        assert!(
+            !listed.contains("0.12") && !listed.contains("0.13"),
+            "{listed}"
+        );
+    }
+    let shown = skinrig(&["show", &session]).out;
+    let shown = shown.split_whitespace().collect::<Vec<_>>().join(" ");
+    let expected = "the results were changed after they were written: analyze the session again";
+    assert!(shown.contains(expected), "{shown}");
+}
+
 #[test]
 fn results_that_were_edited_or_are_older_than_their_session_are_not_used() {
     let lab = Lab::new();
@@ -34,7 +62,7 @@ fn results_that_were_edited_or_are_older_than_their_session_are_not_used() {
     let edited = |change: &dyn Fn(&mut Value)| {
         let mut document: Value = serde_json::from_str(&text).unwrap();
         change(&mut document);
-        std::fs::write(&path, serde_json::to_string_pretty(&document).unwrap()).unwrap();
+        write_results(&path, document);
     };
     let moved: &dyn Fn(&mut Value) = &|document| {
         for press in document["analysis"]["presses"].as_array_mut().unwrap() {
@@ -68,7 +96,7 @@ fn results_that_were_edited_or_are_older_than_their_session_are_not_used() {
     let alignment = &mut document["analysis"]["alignment"];
     alignment["status"] = Value::from("valid");
     alignment["violations"] = Value::Array(Vec::new());
-    std::fs::write(&path, serde_json::to_string_pretty(&document).unwrap()).unwrap();
+    write_results(&path, document);
     skinrig(&["compare", &a, &invalid])
         .code(2)
         .expect_stderr(&["a session is INVALID"]);

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};
+use skinrig_catalogue::results_digest::with_digest;
 use skinrig_model::CameraId;
 use skinrig_recorder::SessionReader;
 use tempfile::TempDir;
@@ -142,6 +143,14 @@ pub(crate) fn only(folder: &Path, ending: &str) -> PathBuf {
     let found = files(folder, ending);
     assert_eq!(found.len(), 1, "expected one *{ending}, found {found:?}");
     found[0].clone()
+}
+
+/// Writes results that were edited, with the digest of their new content.
+#[track_caller]
+pub(crate) fn write_results(path: &Path, mut document: Value) {
+    document.as_object_mut().unwrap().remove("sha256");
+    let text = serde_json::to_string_pretty(&document).unwrap();
+    std::fs::write(path, with_digest(&text)).unwrap();
 }
 
 /// Parses a JSON file.
