@@ -46,7 +46,7 @@ fn simulate(level: SimLevel, presses: u32) -> (Scales, f64) {
     let checked = skinrig::check::load(Path::new(PROTOCOL), &overrides)
         .unwrap_or_else(|failure| panic!("{}", failure.message));
     let (protocol, plan) = (checked.protocol, checked.plan);
-    let rig = skinrig::rig::simulated(&protocol, level, 1, false, &[])
+    let (rig, _) = skinrig::rig::simulated(&protocol, level, 1, false, &[])
         .unwrap_or_else(|failure| panic!("{}", failure.message));
     let header = RunHeader {
         protocol_text: protocol.text.clone(),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use skinrig_controller::{Problem, RunFault, RunReport, SinkFault};
 use skinrig_model::{PressRole, PressVerdict, RunEnd, StopReason};
-use skinrig_protocol::Plan;
+use skinrig_protocol::{Plan, PlantedFault};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::analysis_request::AnalysisRequest;
@@ -23,6 +23,7 @@ pub(crate) fn close(
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     sink.notify(&report, &path);
+    let never_struck = sink.faults_never_struck();
     let mut lost = None;
     if let Err(error) = sink.seal() {
         let is_complete = matches!(error, RecorderError::HeldOpen { .. });
@@ -45,12 +46,26 @@ pub(crate) fn close(
             errln!("warning: {problem}");
         }
     }
+    if lost.is_none() && report.end.is_complete() && !never_struck.is_empty() {
+        return Err(faults_missed(&never_struck, &path));
+    }
     match lost {
         Some(lost) => Err(Failure::rig(format!(
             "{lost}\n  next: start again with `skinrig run`, and do not move a session before its run has ended"
         ))),
         None => Ok((path, report)),
     }
+}
+
+/// A rehearsal whose faults did not all occur shows nothing about them.
+fn faults_missed(faults: &[PlantedFault], session: &Path) -> Failure {
+    let names: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    Failure::input(format!(
+        "expected every injected fault to occur during the run, which is over without {}\n  the session is kept: {}\n  next: \
+         give times that the run reaches; `skinrig plan` lists its presses",
+        names.join(", "),
+        session.display()
+    ))
 }
 
 /// The path relative to the current folder, if it is inside.

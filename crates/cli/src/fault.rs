@@ -8,11 +8,15 @@ use skinrig_controller::SinkFault;
 use skinrig_model::{Record, RigFault};
 use skinrig_protocol::{FaultPhase, FaultTime, PlantedFault};
 use skinrig_recorder::{RecorderError, WriteFailure};
+use skinrig_sim::FaultWatch;
 
-/// Counts the records of a run and injects its faults.
+/// Counts the records of a run, injects its faults, and knows which faults of the run never came due.
 #[derive(Debug, Clone, Default)]
 pub struct FaultInjector {
     faults: Vec<PlantedFault>,
+    /// Faults of devices, in the order of the watch.
+    of_devices: Vec<PlantedFault>,
+    watch: Option<FaultWatch>,
     records: u32,
     journal: u32,
     presses: u32,
@@ -20,17 +24,26 @@ pub struct FaultInjector {
 }
 
 impl FaultInjector {
-    /// An injector for those of these faults that affect records.
+    /// An injector for those of these faults that affect records. The `watch` is that of the rig which injects the others.
     #[must_use]
-    pub fn new(faults: &[PlantedFault]) -> Self {
+    pub fn new(faults: &[PlantedFault], watch: Option<FaultWatch>) -> Self {
+        let (of_records, of_devices) = faults.iter().partition(|fault| fault.kind.is_of_records());
         Self {
-            faults: faults
-                .iter()
-                .copied()
-                .filter(|fault| fault.kind.is_of_records())
-                .collect(),
+            faults: of_records,
+            of_devices,
+            watch,
             ..Self::default()
         }
+    }
+
+    /// The faults that did not occur in a run that is over.
+    #[must_use]
+    pub fn never_struck(&self) -> Vec<PlantedFault> {
+        let struck = self.watch.as_ref().map(FaultWatch::have_struck);
+        let missed = self.of_devices.iter().zip(struck.into_iter().flatten());
+        let missed = missed.filter_map(|(fault, struck)| (!struck).then_some(fault));
+        // A run that is over was not killed, and one whose disk was full did not complete.
+        missed.chain(&self.faults).copied().collect()
     }
 
     /// Called before each record is taken.

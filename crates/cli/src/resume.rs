@@ -15,6 +15,7 @@ use skinrig_notify::Notifier;
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::{Plan, Protocol, Route};
 use skinrig_recorder::{DeviceRow, RecorderError, SessionReader, SessionWriter};
+use skinrig_sim::FaultWatch;
 
 use crate::args::ResumeArgs;
 use crate::conclusion::{close, conclude};
@@ -252,6 +253,7 @@ fn run_leg(
     let rest = rest_of(&protocol, &found.plan, pending)?;
     let OpenedRig {
         rig,
+        watch,
         preflight,
         notes,
         notifier,
@@ -265,7 +267,7 @@ fn run_leg(
         .on_disk_of(folder)
         .controlled(&args.session, operator.control(), false)
         .with_notes(notes)
-        .with_faults(FaultInjector::new(&args.faults))
+        .with_faults(FaultInjector::new(&args.faults, watch))
         .notifying(notifier.map(|notifier| RunMessages::new(notifier, &found.header)));
     let settings = bench::settings(&rig.kind);
     let looks = match found.header.rig_kind.as_str() {
@@ -329,6 +331,8 @@ fn pressed_before(found: &UnfinishedSession, pending: &[bool]) -> Vec<Point2> {
 /// The opened rig of a session.
 struct OpenedRig {
     rig: Rig,
+    /// The watch over injected faults; `None` on a bench.
+    watch: Option<FaultWatch>,
     preflight: Preflight,
     /// Notes for the session.
     notes: Vec<String>,
@@ -376,7 +380,7 @@ fn open_rig(
             .parse()
             .map_err(|e| Failure::input(format!("{}: rig: {e}", args.session.display())))?;
         let faults = &args.faults;
-        let rig = rig::simulated_after(
+        let (rig, watch) = rig::simulated_after(
             &protocol,
             level,
             header.seed,
@@ -392,6 +396,7 @@ fn open_rig(
         return Ok(OpenedRig {
             rig,
             preflight,
+            watch: Some(watch),
             notes,
             notifier,
             bench: None,
@@ -424,6 +429,7 @@ fn open_rig(
         .insert(0, gates::recorder(&args.session));
     Ok(OpenedRig {
         rig,
+        watch: None,
         preflight,
         notes,
         notifier,

@@ -10,7 +10,7 @@ use skinrig_model::{
     PressVerdict, RunHeader, SimLevel,
 };
 use skinrig_notify::Notifier;
-use skinrig_protocol::{Plan, PlantedFault, Protocol};
+use skinrig_protocol::{Plan, Protocol};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 
 use crate::args::RunArgs;
@@ -58,8 +58,8 @@ pub(crate) struct RunInputs<'a> {
     pub expected: HostDuration,
     /// Facts about the presses that are known before the run.
     pub known: ReplayExpectations,
-    /// Injected faults.
-    pub faults: &'a [PlantedFault],
+    /// Injects the faults of the run.
+    pub fault_injector: FaultInjector,
     /// How the looks of the plan are taken.
     pub looks: LookMode,
     /// How touches are felt, if the plan wants them felt.
@@ -94,7 +94,7 @@ pub(crate) fn record(
         ProgressView::hidden(intent.expected)
     };
     let mut sink = SessionSink::new(writer, view, intent.known.clone())
-        .with_faults(FaultInjector::new(intent.faults))
+        .with_faults(intent.fault_injector.clone())
         .notifying(notifier.map(|notifier| RunMessages::new(notifier, &header)));
     let control = operator.control();
     if preflight.is_some() {
@@ -269,7 +269,7 @@ pub(crate) fn simulated(
     if let Some(label) = planted::label(&faults) {
         errln!("warning: {label}\n");
     }
-    let mut rig = rig::simulated(&protocol, level, seed, args.real_time, &faults)?;
+    let (mut rig, watch) = rig::simulated(&protocol, level, seed, args.real_time, &faults)?;
     if level < protocol.scene.level {
         // In the name, so that every report of this session shows it.
         let short = format!(
@@ -284,7 +284,7 @@ pub(crate) fn simulated(
     }
     let preflight = gates::of_simulated(&rig, &args.sessions, summary.expected_bytes);
     let intent = RunInputs {
-        faults: &faults,
+        fault_injector: FaultInjector::new(&faults, Some(watch)),
         looks: LookMode::of_simulation(args.real_time),
         sense: SenseMode::of_simulation(args.real_time),
         ..intent_of(&protocol, seed, summary.duration_s, command_line)
@@ -373,7 +373,7 @@ pub(crate) fn intent_of<'a>(
         command_line,
         expected: HostDuration::from_secs_f64(duration_s),
         known: ReplayExpectations::default(),
-        faults: &[],
+        fault_injector: FaultInjector::default(),
         looks: LookMode::default(),
         sense: SenseMode::default(),
     }
@@ -427,7 +427,7 @@ fn replay(
         command_line,
         expected,
         known: expectations(&reader).map_err(Failure::session)?,
-        faults: &[],
+        fault_injector: FaultInjector::default(),
         looks: LookMode::Recorded(decision(&reader).map_err(Failure::session)?),
         sense: SenseMode::Recorded(reader.touches().map_err(Failure::session)?),
     };

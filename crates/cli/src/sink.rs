@@ -8,6 +8,7 @@ use skinrig_model::{
     CameraId, ExcludedReason, HostTime, InterruptionKind, PressId, PressOutcome, PressTiming,
     PressVerdict, Record,
 };
+use skinrig_protocol::PlantedFault;
 use skinrig_recorder::{RecorderError, SealedSession, SessionWriter};
 
 use crate::fault::FaultInjector;
@@ -124,6 +125,12 @@ impl SessionSink {
     pub(crate) fn with_faults(mut self, fault_injector: FaultInjector) -> Self {
         self.fault_injector = fault_injector;
         self
+    }
+
+    /// The injected faults that did not occur in this run, which is over.
+    #[must_use]
+    pub(crate) fn faults_never_struck(&self) -> Vec<PlantedFault> {
+        self.fault_injector.never_struck()
     }
 
     /// Sends messages about the end of the run.

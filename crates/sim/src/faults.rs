@@ -89,6 +89,15 @@ impl Fault {
         }
     }
 
+    /// When it occurs, for a fault of the shared vocabulary.
+    #[must_use]
+    pub(crate) const fn when(&self) -> Option<FaultTrigger> {
+        match self {
+            Self::Timed(fault) => Some(fault.when),
+            Self::PulseLost { .. } | Self::DeadPress { .. } => None,
+        }
+    }
+
     /// The fault in the shared vocabulary, if it has a name there.
     #[must_use]
     pub const fn kind(&self) -> Option<RigFault> {

@@ -30,4 +30,4 @@ pub mod world;
 pub use clock::{PacedClock, SimClock};
 pub use config::SimConfig;
 pub use faults::{Fault, FaultSizes, FaultTrigger, LineNoise, MotionPhase};
-pub use rig::{in_real_time, simulated_rig};
+pub use rig::{FaultWatch, in_real_time, simulated_rig, watched_rig};

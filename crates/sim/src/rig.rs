@@ -17,10 +17,41 @@ use crate::stalling_clock::StallingClock;
 use crate::trigger::SimTriggerBox;
 use crate::world::Shared;
 
+/// Tells after a run which faults of a simulated rig came due.
+#[derive(Debug, Clone)]
+pub struct FaultWatch {
+    shared: Shared,
+    faults: Vec<Fault>,
+}
+
+impl FaultWatch {
+    /// For each fault of the configuration, whether its time has come. Presses and pulses that were configured to fail always count.
+    #[must_use]
+    pub fn have_struck(&self) -> Vec<bool> {
+        let world = self.shared.world();
+        let struck = |fault: &Fault| fault.when().is_none_or(|when| world.has_occurred(when));
+        self.faults.iter().map(struck).collect()
+    }
+}
+
 /// The rig of `config` at time 0 with a simulated clock.
 #[must_use]
 pub fn simulated_rig(config: &SimConfig) -> Rig {
+    watched_rig(config).0
+}
+
+/// Like [`simulated_rig`], with the watch over its faults.
+#[must_use]
+pub fn watched_rig(config: &SimConfig) -> (Rig, FaultWatch) {
     let shared = Shared::new(config);
+    let watch = FaultWatch {
+        shared: shared.clone(),
+        faults: config.faults.clone(),
+    };
+    (rig_in(&shared, config), watch)
+}
+
+fn rig_in(shared: &Shared, config: &SimConfig) -> Rig {
     let camera = |id: CameraId| -> Box<dyn EventCamera> {
         let pixels = pixel_factory(config, id);
         Box::new(SimCamera::new(config, id, shared.clone(), pixels))

@@ -167,7 +167,7 @@ fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: 
     let killed = fault.filter(|fault| fault.kind == RigFault::Killed);
     let mut sink = Sink {
         writer: Some(SessionWriter::create(&path).unwrap()),
-        injector: FaultInjector::new(if killed.is_some() { &[] } else { &faults }),
+        injector: FaultInjector::new(if killed.is_some() { &[] } else { &faults }, None),
         killed_at: killed.map(|fault| fault.when),
         record_times: Vec::new(),
         moved: false,

@@ -29,6 +29,7 @@ use skinrig_sim::SimClock;
 use crate::args::ImportArgs;
 use crate::conclusion::conclude;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::fault::FaultInjector;
 use crate::looks::LookMode;
 use crate::run::{RunInputs, record};
 use crate::sense::SenseMode;
@@ -118,7 +119,7 @@ pub(crate) fn import(args: &ImportArgs, command_line: &str, output: Output) -> O
         command_line,
         expected: HostDuration(last),
         known,
-        faults: &[],
+        fault_injector: FaultInjector::default(),
         looks: LookMode::default(),
         sense: SenseMode::default(),
     };

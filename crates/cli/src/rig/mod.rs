@@ -16,13 +16,13 @@ use skinrig_model::{HostTime, InterruptionKind, Point2, RunHeader, SimLevel, Ste
 use skinrig_protocol::{PlantedFault, Protocol};
 use skinrig_sim::optical::{OpticalConfig, Parts};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
-use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
+use skinrig_sim::{FaultWatch, SimConfig, in_real_time, watched_rig};
 
 use crate::exit::Failure;
 use crate::recording::SessionRecording;
 use skinrig_results::RigDocument;
 
-/// The simulated rig for `protocol`, with the injected device faults; its name lists all `faults`.
+/// The simulated rig for `protocol`, with the injected device faults and the watch over them; its name lists all `faults`.
 ///
 /// # Errors
 /// [`Failure::input`] for a fault that the simulated rig does not support.
@@ -32,7 +32,7 @@ pub fn simulated(
     seed: u64,
     real_time: bool,
     faults: &[PlantedFault],
-) -> Result<Rig, Failure> {
+) -> Result<(Rig, FaultWatch), Failure> {
     simulated_after(protocol, level, seed, real_time, faults, Vec::new())
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn simulated_after(
     real_time: bool,
     faults: &[PlantedFault],
     pressed_before: Vec<Point2>,
-) -> Result<Rig, Failure> {
+) -> Result<(Rig, FaultWatch), Failure> {
     let mut config = SimConfig {
         pressed_before,
         ..SimConfig::new(seed, level)
@@ -65,12 +65,13 @@ pub(crate) fn simulated_after(
         config.nominal = StereoGeometry { cameras };
     }
     config.faults = planted::of_devices(faults).map_err(Failure::input)?;
-    let mut rig = simulated_rig(&config);
+    let (mut rig, watch) = watched_rig(&config);
     planted::mark_name(&mut rig, faults);
     for (settings, request) in rig.camera_settings.iter_mut().zip(&protocol.cameras) {
         requests::apply(settings, request);
     }
-    Ok(if real_time { in_real_time(rig) } else { rig })
+    let rig = if real_time { in_real_time(rig) } else { rig };
+    Ok((rig, watch))
 }
 
 /// A recorded session as a rig.

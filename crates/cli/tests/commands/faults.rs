@@ -54,6 +54,33 @@ fn a_bench_takes_no_faults() {
     assert!(files(&lab.path("."), ".sqlite").is_empty());
 }
 
+/// A rehearsal in which a fault never occurred has tested nothing.
+#[test]
+fn a_run_without_one_of_its_faults_fails_and_names_it() {
+    let lab = Lab::new();
+    for (n, (never, occurs)) in [
+        ("robot-slow@hold:9999", "trigger-lost@contact:2"),
+        ("camera1-drops@time:18000s", "trigger-lost@arming"),
+        ("killed@record:9999999", "camera2-drops@hold:1"),
+        ("disk-full@press:9999", "camera2-drops@time:1s"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let folder = lab.path(&n.to_string());
+        let mut run = vec!["run", SMALL, "--sessions"];
+        let path = text(&folder);
+        run.extend([&*path, "--no-analysis", "--fault", never, "--fault", occurs]);
+        let ended = skinrig(&run).code(2);
+        let session = text(&only(&folder, ".session.sqlite"));
+        ended.expect_stderr(&[
+            &format!("the run, which is over without {never}\n"),
+            &format!("the session is kept: {session}"),
+        ]);
+        skinrig(&["verify", &session]).code(0);
+    }
+}
+
 #[test]
 fn an_unknown_fault_is_refused() {
     let run = |plant: [&str; 2]| skinrig(&["run", SMALL, plant[0], plant[1]]).code(2);
