@@ -1,6 +1,6 @@
 //! Decides whether the numbers of an analysis may be used.
 
-use super::{Analysis, WarningCause};
+use super::{Analysis, Warning, WarningCause};
 
 impl Analysis {
     /// False if the numbers of the session must not be used: its clocks are not known well enough, the audit found that
@@ -21,6 +21,13 @@ impl Analysis {
     pub fn nothing_counts(&self) -> Option<&WarningCause> {
         let mut causes = self.warnings.iter().map(|w| &w.cause);
         causes.find(|c| matches!(c, WarningCause::NothingCounts { .. }))
+    }
+
+    /// The warnings beside an answer: all but the one that makes the session invalid, which is a reason of
+    /// [`Self::invalid_because`].
+    pub fn remarks(&self) -> impl Iterator<Item = &Warning> {
+        let all = self.alignment.warnings.iter().chain(&self.warnings);
+        all.filter(|w| !matches!(w.cause, WarningCause::NothingCounts { .. }))
     }
 
     /// Why the numbers must not be used, one text per reason; empty for a valid session.

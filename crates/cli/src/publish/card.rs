@@ -176,13 +176,7 @@ fn limits(about: &Publication, sessions: &[Published]) -> String {
     for session in sessions {
         let (a, p) = (&session.analysis, &session.provenance);
         let mut found = BTreeSet::new();
-        found.extend(
-            a.alignment
-                .warnings
-                .iter()
-                .chain(&a.warnings)
-                .map(ToString::to_string),
-        );
+        found.extend(a.remarks().map(ToString::to_string));
         found.extend(a.findings.iter().map(|f| f.evidence.to_string()));
         found.extend(derive::geometry_note(a));
         found.extend(derive::off_sensor(a));

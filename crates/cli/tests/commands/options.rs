@@ -251,6 +251,14 @@ fn a_session_in_which_no_press_counts_is_invalid() {
         "expected at least one of 8 presses to count, found none",
         "next:",
     ]);
+    let reason = "expected at least one of 8 presses to count";
+    for more in [&[][..], &["-v"]] {
+        let arguments = [&["analyze", &session, "--set", all][..], more].concat();
+        let printed = skinrig(&arguments).code(4).out;
+        let mut lines = printed.lines().filter(|line| line.contains(reason));
+        let (line, next) = (lines.next().unwrap_or_default(), lines.next());
+        assert!(line.starts_with("INVALID") && next.is_none(), "{printed}");
+    }
     for (wrong, part) in [("[11]", "which has 10"), ("[1]", "never score")] {
         let set = format!("analysis.exclude_press_numbers={wrong}");
         skinrig(&["analyze", &session, "--set", &set])

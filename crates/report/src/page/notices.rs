@@ -84,8 +84,7 @@ fn troubles(input: &ReportInput<'_>) -> Vec<Note> {
         }
         notes.push(Note::new("Data lost.", text + ".").bad());
     }
-    let warnings = a.alignment.warnings.iter().chain(&a.warnings);
-    notes.extend(warnings.map(|w| Note::of(w.to_string()).warning()));
+    notes.extend(a.remarks().map(|w| Note::of(w.to_string()).warning()));
     let legs = p.several_legs();
     if !legs.is_empty() {
         let head = "The session was resumed; the clocks of each leg are fitted separately.";

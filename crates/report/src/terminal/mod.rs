@@ -167,11 +167,12 @@ fn problems(a: &Analysis) -> Section {
         };
         [note, Note::of(format!("do: {}", f.advice))]
     });
-    let warnings = a.alignment.warnings.iter().chain(&a.warnings);
-    let warnings = warnings.map(ToString::to_string);
+    let nothing = a.nothing_counts().map(ToString::to_string);
+    let nothing = nothing.map(|why| Note::new("INVALID", why));
+    let warnings = a.remarks().map(ToString::to_string);
     let warnings = derive::disagreement(a).into_iter().chain(warnings);
     let warnings = warnings.map(|text| Note::new("warning", text));
-    let notes = violations.chain(findings).chain(warnings);
+    let notes = violations.chain(findings).chain(nothing).chain(warnings);
     Section::plain().with_all(notes.map(Note::warning))
 }
 

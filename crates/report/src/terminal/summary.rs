@@ -155,8 +155,7 @@ fn remarks(input: &ReportInput<'_>) -> Vec<Note> {
         all.push(("left out", text));
     }
     all.extend(derive::disagreement(a).map(|text| ("warning", text)));
-    let warnings = a.alignment.warnings.iter().chain(&a.warnings);
-    all.extend(warnings.map(|w| ("warning", w.to_string())));
+    all.extend(a.remarks().map(|w| ("warning", w.to_string())));
     let notes = all.into_iter().map(|(label, text)| {
         let lines = if label == "do" {
             MAX_ADVICE
