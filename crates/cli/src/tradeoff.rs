@@ -54,6 +54,7 @@ impl From<CostKind> for Cost {
             CostKind::Cpu => Self::Cpu,
             CostKind::Bytes => Self::Bytes,
             CostKind::Delay => Self::Delay,
+            CostKind::Pixels => Self::Pixels,
         }
     }
 }
@@ -79,7 +80,14 @@ fn recommendations<'a>(measured: &'a Measured, args: &TradeoffArgs) -> Vec<Recom
         ),
         found: measured.select(Requirement::Budget(s * 1e6, Cost::Cpu)),
     });
-    target.into_iter().chain(budget).collect()
+    let pixels = args.pixels.map(|grid| Recommendation {
+        question: format!(
+            "most accurate with at most {} pixels of a camera ({grid})",
+            grid.pixels()
+        ),
+        found: measured.select(Requirement::Budget(f64::from(grid.pixels()), Cost::Pixels)),
+    });
+    target.into_iter().chain(budget).chain(pixels).collect()
 }
 
 fn bound(bound: Option<f64>) -> String {
@@ -122,12 +130,13 @@ fn print_recommendation(
     let paint = Paint::new(crate::terminal::is_coloured(&std::io::stdout()));
     let chosen = format!("{name}: RMSE {} mm", bound(rmse.value));
     outln!(
-        "  {}, 95 % interval [{}, {}], n {} that did not choose;\n  {:.3} ms of CPU time per press",
+        "  {}, 95 % interval [{}, {}], n {} that did not choose;\n  {:.3} ms of CPU time per press, {} pixels",
         paint.bold(&chosen),
         bound(rmse.low),
         bound(rmse.high),
         rmse.n,
-        row.cpu_us * 1e-3
+        row.cpu_us * 1e-3,
+        row.pixels
     );
     if let Some(prediction) = prediction {
         print_prediction(prediction, row);
@@ -182,6 +191,7 @@ const fn cost_name(cost: CostKind) -> &'static str {
         CostKind::Cpu => "CPU time",
         CostKind::Bytes => "bytes",
         CostKind::Delay => "delay",
+        CostKind::Pixels => "pixels",
     }
 }
 

@@ -11,7 +11,7 @@ use skinrig_recorder::{RecorderError, SessionReader};
 use crate::analyses::tradeoff_path;
 
 /// Values of the document's `format` and `format_version`.
-pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 3);
+pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 4);
 
 /// The session of the results, as it was.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]

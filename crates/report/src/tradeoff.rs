@@ -26,7 +26,7 @@ pub enum Rows {
 /// The page has all choices up to this many; the data files always have all.
 const MAX_ROWS: usize = 120;
 
-/// Fronts of a row as letters: c for CPU time, b for bytes, d for delay.
+/// Fronts of a row as letters: c for CPU time, b for bytes, d for delay, p for pixels.
 fn fronts(row: &Row) -> String {
     let letter = |(cost, letter): (Cost, char)| {
         if row.fronts.contains(&cost) {
@@ -35,10 +35,15 @@ fn fronts(row: &Row) -> String {
             ' '
         }
     };
-    [(Cost::Cpu, 'c'), (Cost::Bytes, 'b'), (Cost::Delay, 'd')]
-        .map(letter)
-        .iter()
-        .collect()
+    [
+        (Cost::Cpu, 'c'),
+        (Cost::Bytes, 'b'),
+        (Cost::Delay, 'd'),
+        (Cost::Pixels, 'p'),
+    ]
+    .map(letter)
+    .iter()
+    .collect()
 }
 
 fn percent(e: &Estimate) -> String {
@@ -70,8 +75,8 @@ fn table(result: &Tradeoff, rows: Rows) -> Table {
         "choices",
         "All choices",
         [
-            Column::of_terminals("", Cells::left(3)),
-            Column::new("Choice").terminal("", Cells::left(31).clipped()),
+            Column::of_terminals("", Cells::left(4)),
+            Column::new("Choice").terminal("", Cells::left(30).clipped()),
             Column::new("#Front"),
             number_of("RMSE (mm)", "RMSE\nmm", 6),
             number_of("95 % interval", "95 % interval\nmm", 14),
@@ -83,6 +88,7 @@ fn table(result: &Tradeoff, rows: Rows) -> Table {
             Column::new("#CPU range"),
             number_of("Sent (kB/s)", "sent\nkB/s", 7),
             number_of("Delay (ms)", "delay\nms", 6),
+            Column::new("#Pixels"),
         ],
     )
     .class("trade");
@@ -113,6 +119,7 @@ fn table(result: &Tradeoff, rows: Rows) -> Table {
             format!("{} to {}", short(low), short(high)),
             short(row.bytes_per_s / 1e3),
             short(row.delay_ms),
+            row.pixels.to_string(),
         ];
         let own = (i == 0).then_some("the session's settings; all others change them");
         let row = document::Row::new(cells).class(class).style(style);
@@ -129,7 +136,7 @@ pub fn terminal_table(result: &Tradeoff, rows: Rows, rig: &str, color: bool) -> 
         "{}\n{} of {} choices tried on {used} of {of} attempted scoring presses (n: those that count),\n\
          each calibrated (model {}) on {} of {} others.\n\
          A choice competes when it locates at least {} % of the presses; others are in brackets.\n\
-         Front: c CPU time, b bytes, d delay. CPU: median of {} runs over {} presses, both cameras.\n\n",
+         Front: c CPU time, b bytes, d delay, p pixels. CPU: median of {} runs over {} presses, both cameras.\n\n",
         crate::format::plain(rig),
         result.rows.len(),
         result.predictions.combinations,

@@ -114,6 +114,20 @@ fn results_do_not_depend_on_times_and_costs_follow_the_choice() {
     // The rows of 16 px bins are 4 bits shorter in each direction.
     let coarse = find(|c| c.bin_px = 16);
     assert!((coarse.bytes_per_s / own.bytes_per_s - 13.0 / 21.0).abs() < 1e-9);
+    let rows = coarse.rows.map(|(first, last)| u32::from(last - first) + 1);
+    assert_eq!(coarse.pixels, 40 * rows[0].max(rows[1]).div_ceil(16));
+    let grids = one.rows.iter().filter(|r| {
+        let other = Choice {
+            bin_px: own.choice.bin_px,
+            region: own.choice.region,
+            ..r.choice
+        };
+        other == own.choice
+    });
+    assert_eq!(grids.count(), 15, "five bins by three parts of the rows");
+    let few = Requirement::Budget(f64::from(coarse.pixels), Cost::Pixels);
+    let found = measured.select(few).unwrap().row;
+    assert!(found.pixels <= coarse.pixels && found.competes);
     // So few events are left that nothing can be located: that is a failure, not an absence.
     let thinned_away = find(|c| c.thinning = 1024);
     assert_eq!(

@@ -191,6 +191,19 @@ pub(super) fn curves(session: Choice) -> Vec<Choice> {
     distinct(all)
 }
 
+/// Every bin with every part of the rows, otherwise as `about`: the front of pixels.
+#[must_use]
+pub(super) fn grids(about: Choice) -> Vec<Choice> {
+    let grid = |bin_px| {
+        REGIONS.map(|region| Choice {
+            bin_px,
+            region,
+            ..about
+        })
+    };
+    SIDES_PX.into_iter().flat_map(grid).collect()
+}
+
 fn windows() -> impl Iterator<Item = Option<f64>> {
     WINDOWS_MS.iter().map(|w| Some(*w)).chain([None])
 }

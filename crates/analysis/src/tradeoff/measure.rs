@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use skinrig_model::{AnalysisSettings, CalibrationModel, Locator};
+use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, SENSOR_WIDTH};
 
 use super::choice::{self, Choice};
 use super::plan::{Plan, Progress};
@@ -67,6 +67,7 @@ impl Measuring<'_> {
             events_per_press: outcome.events_per_press,
             bytes_per_s: outcome.events_per_press * bits / 8.0 / self.press_s,
             delay_ms: outcome.delay_ms,
+            pixels: pixels(crop, settings.bin_px),
             cpu_us: 0.0,
             cpu_range_us: (0.0, 0.0),
             competes: false,
@@ -135,6 +136,14 @@ impl Measuring<'_> {
             };
             self.add(choice);
         }
+        let best = self.best.map(|best| self.points[best].choice);
+        for about in [Some(base), best].into_iter().flatten() {
+            for choice in choice::grids(about) {
+                if search::is_fresh(choice, &self.points) {
+                    self.add(choice);
+                }
+            }
+        }
         Predictions {
             combinations,
             curve_rows: curves.len(),
@@ -171,6 +180,13 @@ impl Measuring<'_> {
         let numbered = tested.map(|(i, p)| (first + i, i < how.check_rows, *p));
         how.of = predict(&rule, draws, numbered, search::DRAWS);
     }
+}
+
+/// Pixels of the camera that reads more rows, in bins of this side.
+fn pixels(rows: [(u16, u16); 2], bin_px: u16) -> u32 {
+    let bins = |count: u16| u32::from(count.div_ceil(bin_px.max(1)));
+    let rows = rows.map(|(first, last)| bins(last.abs_diff(first).saturating_add(1)));
+    bins(SENSOR_WIDTH) * rows[0].max(rows[1])
 }
 
 /// Bits per event of the settings; halving columns or rows shortens a pixel address by one bit.

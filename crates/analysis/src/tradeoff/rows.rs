@@ -17,11 +17,13 @@ pub enum Cost {
     Bytes,
     /// Time from contact to the estimate.
     Delay,
+    /// Pixels that are read, after cropping and binning.
+    Pixels,
 }
 
 impl Cost {
     /// All costs.
-    pub const ALL: [Self; 3] = [Self::Cpu, Self::Bytes, Self::Delay];
+    pub const ALL: [Self; 4] = [Self::Cpu, Self::Bytes, Self::Delay, Self::Pixels];
 
     /// Value of this cost in a row.
     #[must_use]
@@ -30,6 +32,7 @@ impl Cost {
             Self::Cpu => row.cpu_us,
             Self::Bytes => row.bytes_per_s,
             Self::Delay => row.delay_ms,
+            Self::Pixels => row.pixels as f64,
         }
     }
 }
@@ -86,6 +89,8 @@ pub struct Row {
     pub bytes_per_s: f64,
     /// Time from contact to the end of the window, ms.
     pub delay_ms: f64,
+    /// Pixels of the camera that reads more: the sensor's columns by these rows, in bins.
+    pub pixels: u32,
     /// CPU time from the events to the location, median over the repeats, µs per press.
     pub cpu_us: f64,
     /// Lowest and highest of the repeats, µs.

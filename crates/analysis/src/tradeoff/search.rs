@@ -35,14 +35,17 @@ pub(super) fn pool(all: &[Choice], rule: &Rule<'_>) -> Vec<(Choice, f64)> {
 /// The pool in random order, without what was measured.
 pub(super) fn shuffled(pool: &[(Choice, f64)], measured: &[Point], seed: u64) -> Vec<Choice> {
     let fresh = pool.iter().map(|p| p.0);
-    let mut order: Vec<Choice> = fresh
-        .filter(|c| measured.iter().all(|p| class(p.choice) != class(*c)))
-        .collect();
+    let mut order: Vec<Choice> = fresh.filter(|c| is_fresh(*c, measured)).collect();
     let mut rng = seeded::generator(seed, STREAM);
     for i in (1..order.len()).rev() {
         order.swap(i, seeded::index(&mut rng, i + 1));
     }
     order
+}
+
+/// True if no choice that measures the same was measured.
+pub(super) fn is_fresh(choice: Choice, measured: &[Point]) -> bool {
+    measured.iter().all(|p| class(p.choice) != class(choice))
 }
 
 /// Draws until `count` compete, or too many do not.
@@ -119,11 +122,10 @@ pub(super) fn promising(
         .filter(|(p, ..)| of_front(p.choice))
         .map(|(p, log, _)| (cost(p.choice, p.events), *log))
         .collect();
-    let fresh = |c: Choice| measured.iter().all(|p| class(p.choice) != class(c));
     let mut best: Option<(f64, Choice)> = None;
     for (choice, rmse) in pool.iter().filter(|(c, _)| of_front(*c)) {
         let is_variant = choice.precision == Precision::F64 && choice::has_f32(*choice);
-        if is_variant || !fresh(*choice) {
+        if is_variant || !is_fresh(*choice, measured) {
             continue;
         }
         let near = competing

@@ -24,6 +24,7 @@ pub(super) fn row(rmse: Option<f64>, cost: f64, located: f64) -> Row {
         events_per_press: cost,
         bytes_per_s: cost,
         delay_ms: 100.0,
+        pixels: 640 * 176,
         cpu_us: cost,
         cpu_range_us: (cost, cost),
         competes: false,

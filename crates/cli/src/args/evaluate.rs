@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use skinrig_protocol::limits::Margin;
 
 use super::values::{
-    ReplaySpeed, StopRule, length_mm, limit_mm, per_second, percent, replay_speed, stop_rule,
-    time_s,
+    Grid, ReplaySpeed, StopRule, grid, length_mm, limit_mm, per_second, percent, replay_speed,
+    stop_rule, time_s,
 };
 
 /// Arguments of `analyze`.
@@ -105,6 +105,8 @@ pub enum CostKind {
     Bytes,
     /// Time from contact to estimate.
     Delay,
+    /// Pixels that are read, after cropping and binning.
+    Pixels,
 }
 
 /// Arguments of `tradeoff`.
@@ -128,6 +130,11 @@ pub(crate) struct TradeoffArgs {
     /// Recommend the most accurate choice within this CPU time per press, for example `100us`.
     #[arg(long, value_name = "TIME", value_parser = time_s)]
     pub budget: Option<f64>,
+
+    /// Recommend the most accurate choice that reads at most as many pixels of a camera as a grid of this size, for example
+    /// `64x48`.
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = grid)]
+    pub pixels: Option<Grid>,
 
     /// Smallest share of located presses for a choice to qualify [default: that of the session's own settings less 1 %].
     #[arg(long, value_name = "PERCENT", value_parser = percent)]

@@ -211,7 +211,7 @@ pub(crate) enum Command {
     /// Measure the trade-off between speed and accuracy on a session: estimators, windows, thinning, bins, rows.
     #[command(
         after_help = "Examples:\n  skinrig tradeoff sessions/NAME.session.sqlite\n  \
-        skinrig tradeoff sessions/NAME.session.sqlite --target-rmse 6mm --budget 100us"
+        skinrig tradeoff sessions/NAME.session.sqlite --target-rmse 6mm --budget 100us --pixels 64x48"
     )]
     Tradeoff(TradeoffArgs),
 

@@ -1,5 +1,7 @@
 //! Parsers of command line values with units and ranges.
 
+use std::fmt;
+
 use super::files::Exclude;
 use skinrig_settings::Dimension;
 use skinrig_settings::quantity::{self, QuantityError};
@@ -31,6 +33,9 @@ pub(super) enum ValueError {
     /// No presses, or no reason.
     #[error("expected PRESSES=REASON, for example `7,12-14=the lamp failed`, found `{found}`")]
     Exclude { found: String },
+    /// Not two whole numbers above 0.
+    #[error("expected WIDTHxHEIGHT in pixels, for example `64x48`, found {found}")]
+    Grid { found: String },
     /// Neither a factor above 0 nor `max`.
     #[error("expected a factor above 0 or `max`, found {found}")]
     Speed { found: String },
@@ -41,6 +46,39 @@ pub(super) fn limit_mm(text: &str) -> Result<f64, ValueError> {
     match text.parse::<f64>() {
         Ok(mm) if mm > 0.0 && mm.is_finite() => Ok(mm),
         _ => Err(ValueError::Limit {
+            found: text.to_owned(),
+        }),
+    }
+}
+
+/// Size of a grid of pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Grid {
+    width: u16,
+    height: u16,
+}
+
+impl Grid {
+    /// Its number of pixels.
+    #[must_use]
+    pub(crate) fn pixels(self) -> u32 {
+        u32::from(self.width) * u32::from(self.height)
+    }
+}
+
+impl fmt::Display for Grid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+/// A grid of pixels, as `WIDTHxHEIGHT`.
+pub(super) fn grid(text: &str) -> Result<Grid, ValueError> {
+    let side = |side: &str| side.trim().parse().ok().filter(|n| *n > 0);
+    let sides = text.split_once('x').map(|(w, h)| (side(w), side(h)));
+    match sides {
+        Some((Some(width), Some(height))) => Ok(Grid { width, height }),
+        _ => Err(ValueError::Grid {
             found: text.to_owned(),
         }),
     }

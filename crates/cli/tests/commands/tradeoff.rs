@@ -39,6 +39,8 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
         "1",
         "--budget",
         "10s",
+        "--pixels",
+        "64x48",
     ];
     let output = skinrig(&arguments).code(0).json();
     let rows = output["tradeoff"]["rows"].as_array().unwrap();
@@ -91,11 +93,28 @@ fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
     }
     assert!(output["answers"][0]["row"]["cpu_us"].as_f64().unwrap() > 0.0);
     assert_eq!(output["answers"][0]["confirmed_mm"]["n"], 6);
+    let coarse = &output["answers"][1]["row"];
+    assert!(coarse["pixels"].as_u64().unwrap() <= 64 * 48, "{coarse}");
+    assert!(
+        coarse["overrides"].to_string().contains("analysis.bin"),
+        "{coarse}"
+    );
     let machine = &output["machine"];
     assert_eq!(machine["architecture"], std::env::consts::ARCH);
     assert!(machine["threads"].as_u64() >= Some(1), "{machine}");
     let page = std::fs::read_to_string(output["files"]["page"].as_str().unwrap()).unwrap();
     assert!(page.contains("<svg") && page.contains("</html>"), "{page}");
+}
+
+#[test]
+fn a_grid_is_two_numbers_of_pixels() {
+    for wrong in ["64", "64x", "0x48", "64x48x2", "64x48.5", "1e3x4"] {
+        let refused = skinrig(&["tradeoff", "none.session.sqlite", "--pixels", wrong]).code(2);
+        refused.expect_stderr(&[
+            "expected WIDTHxHEIGHT in pixels, for example `64x48`",
+            wrong,
+        ]);
+    }
 }
 
 #[test]

@@ -15,6 +15,7 @@ pub(crate) const fn name(cost: Cost) -> &'static str {
         Cost::Cpu => "CPU",
         Cost::Bytes => "bytes",
         Cost::Delay => "delay",
+        Cost::Pixels => "pixels",
     }
 }
 
@@ -23,6 +24,7 @@ const fn axis(cost: Cost) -> &'static str {
         Cost::Cpu => "CPU time per press (µs)",
         Cost::Bytes => "bytes sent during a press (kB/s)",
         Cost::Delay => "contact to end of window (ms)",
+        Cost::Pixels => "pixels that are read, after rows and bin",
     }
 }
 
@@ -49,13 +51,13 @@ const fn mark_of(estimator: Estimator) -> ([&'static str; 2], &'static str) {
     }
 }
 
-/// Three panels, one per cost. Points are choices, one mark per estimator; hollow ones locate too few presses. `foot` names
+/// Four panels, one per cost. Points are choices, one mark per estimator; hollow ones locate too few presses. `foot` names
 /// the session.
 #[must_use]
 pub(crate) fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
     let caption = format!(
         "RMSE of {} ways to locate the same {} attempted scoring presses (those that count in each), against CPU time, \
-         data sent and delay, all logarithmic. Lines: Pareto fronts, where no other choice is better in both; bars: 95 \
+         data sent, delay and pixels of a camera, all logarithmic. Lines: Pareto fronts, where no other choice is better in both; bars: 95 \
          % intervals over locations. Hollow: not on any front, because fewer than {} % of the presses were located. \
          Ring: the session's own choice. {rig}",
         result.rows.len(),
@@ -67,7 +69,7 @@ pub(crate) fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
         Sample::Path(classes[i], data)
     };
     let sheet = Sheet::new("tradeoff", "Error against cost", caption, WIDE)
-        .columns(&[1.0; 3])
+        .columns(&[1.0; 2])
         .legend([
             (sample(Estimator::Dbscan, 0), "dbscan"),
             (sample(Estimator::ColumnMedian, 0), "median"),
@@ -76,7 +78,14 @@ pub(crate) fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
             (sample(Estimator::Dbscan, 1), "locates too few"),
             (Sample::Ring("select"), "the session's own"),
         ])
-        .row(468.0, Cost::ALL.map(|cost| plot(result, cost)));
+        .row(
+            468.0,
+            [Cost::Cpu, Cost::Bytes].map(|cost| plot(result, cost)),
+        )
+        .row(
+            468.0,
+            [Cost::Delay, Cost::Pixels].map(|cost| plot(result, cost)),
+        );
     let n = format!(
         "n = {} presses, {} choices",
         result.scored.0,
@@ -179,12 +188,13 @@ fn labels(
 
 fn tooltip(row: &Row) -> String {
     format!(
-        "{}: RMSE {} mm, located {} %, {} µs, {} kB/s, {} ms",
+        "{}: RMSE {} mm, located {} %, {} µs, {} kB/s, {} ms, {} px",
         label(&row.choice),
         number(row.rmse_mm.value, 2),
         number(row.located_rate.value.map(|v| 100.0 * v), 1),
         short(row.cpu_us),
         short(row.bytes_per_s / 1e3),
-        short(row.delay_ms)
+        short(row.delay_ms),
+        row.pixels
     )
 }

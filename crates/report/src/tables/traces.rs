@@ -68,6 +68,7 @@ pub(super) fn tradeoff(result: &Tradeoff) -> Value {
         .number("cpu_us_per_press", 2, |r| r.cpu_us)
         .number("bytes_per_s", 0, |r| r.bytes_per_s)
         .number("delay_ms", 2, |r| r.delay_ms)
+        .number("pixels", 0, |r| f64::from(r.pixels))
         .flag("competes", |r| r.competes)
         .finish()
 }

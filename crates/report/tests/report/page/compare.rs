@@ -91,6 +91,7 @@ fn row(estimator: Estimator, window_ms: Option<f64>, rmse: f64, fronts: &[Cost])
         events_per_press: 9000.0,
         bytes_per_s: 75_300.0 / rmse,
         delay_ms: window_ms.unwrap_or(550.0),
+        pixels: 640 * 480,
         cpu_us: 1234.0 / rmse,
         cpu_range_us: (1100.0 / rmse, 1500.0 / rmse),
         competes: !fronts.is_empty() || window_ms.is_none(),
