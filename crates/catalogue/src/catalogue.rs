@@ -157,6 +157,40 @@ impl Catalogue {
         Ok(done)
     }
 
+    /// Replaces the tags and notes of these sessions, and nothing else; each must be in the catalogue. Until it is registered, such a
+    /// session counts as stale. A file that cannot be used is part of the result.
+    ///
+    /// # Errors
+    /// If a folder or the catalogue cannot be read or written.
+    pub fn register_annotations(
+        &mut self,
+        sessions: &[PathBuf],
+    ) -> Result<Registration, CatalogueError> {
+        let mut done = Registration::default();
+        for path in sessions {
+            let name = path.file_name().unwrap_or_default();
+            let file = name.to_string_lossy().into_owned();
+            let reason = match entry::read(path, &[]) {
+                Err(e) => Some(e.to_string()),
+                Ok(entry) => match entry.tags_problem.clone() {
+                    Some(problem) => Some(problem),
+                    None => {
+                        let is_known = self
+                            .transaction("registering tags and notes", async |db| {
+                                write::annotate(db, &entry).await
+                            })?;
+                        (!is_known).then(|| "not in the catalogue: register it first".to_owned())
+                    }
+                },
+            };
+            match reason {
+                None => done.registered.push(file),
+                Some(reason) => done.unreadable.push(Unreadable { file, reason }),
+            }
+        }
+        Ok(done)
+    }
+
     /// Registers sessions that the caller has read, each with the name of its file in the catalogue's folder, in one transaction.
     ///
     /// # Errors

@@ -36,6 +36,18 @@ pub enum CatalogueError {
         /// The operation that waited.
         doing: &'static str,
     },
+    /// The user of a server may not do this.
+    #[error(
+        "{place}: {doing}: {found}; ask an administrator for the role that allows it (`skinrig catalogue roles --help` lists them)"
+    )]
+    Denied {
+        /// The catalogue, without a password.
+        place: String,
+        /// The operation.
+        doing: &'static str,
+        /// The server's words.
+        found: String,
+    },
     /// There is no catalogue.
     #[error("{place}: expected a catalogue, found none; `skinrig catalogue rebuild` creates one")]
     Missing {
@@ -105,15 +117,26 @@ pub enum CatalogueError {
     },
 }
 
+/// SQLSTATE of a missing right (PostgreSQL manual, appendix A).
+const INSUFFICIENT_PRIVILEGE: &str = "42501";
+
 impl CatalogueError {
     /// A failed query at `place`.
     pub(crate) fn sql(place: &str, doing: &'static str, source: sqlx::Error) -> Self {
         let place = place.to_owned();
         // Result codes: <https://www.sqlite.org/rescode.html>.
         let code = match &source {
-            sqlx::Error::Database(e) => e.code().and_then(|c| c.parse::<i32>().ok()),
+            sqlx::Error::Database(e) => e.code(),
             _ => None,
         };
+        if is_of_server(&source) && code.as_deref() == Some(INSUFFICIENT_PRIVILEGE) {
+            return Self::Denied {
+                place,
+                doing,
+                found: source.to_string(),
+            };
+        }
+        let code = code.and_then(|c| c.parse::<i32>().ok());
         match code.filter(|_| !is_of_server(&source)).map(|c| c & 0xff) {
             Some(5 | 6) => Self::Busy { place, doing },
             Some(11 | 26) => Self::Damaged {

@@ -23,6 +23,7 @@ mod question;
 mod questions;
 mod results;
 pub mod results_digest;
+mod roles;
 mod schema;
 mod status;
 mod value;
@@ -42,5 +43,6 @@ pub use results::{
     ANALYSIS_MARK, AnalysisEntry, AnalysisFigures, CalibrationEntry, ClockEntry, EstimateEntry,
     RESULTS_SUFFIX,
 };
+pub use roles::{ROLES, Role};
 pub use status::{FolderStatus, StaleFile, Staleness, Unreadable};
 pub use value::Value;

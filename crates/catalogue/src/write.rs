@@ -263,6 +263,33 @@ async fn details(db: &mut Db, entry: &SessionEntry) -> Result<(), sqlx::Error> {
         ]
     };
     DEVICES.all(db, entry.devices.iter().map(device)).await?;
+    annotations(db, entry).await?;
+    for analysis in &entry.analyses {
+        self::analysis(db, id, analysis).await?;
+    }
+    Ok(())
+}
+
+/// Replaces tags and notes of a session. Returns false, without a change, if the session is not in the catalogue.
+pub(crate) async fn annotate(db: &mut Db, entry: &SessionEntry) -> Result<bool, sqlx::Error> {
+    let id = entry.headline.session_id.as_str();
+    db.lock(id).await?;
+    let known = db
+        .fetch("SELECT 1 FROM session WHERE session_id = $1", &[id.into()])
+        .await?;
+    if known.rows.is_empty() {
+        return Ok(false);
+    }
+    db.execute("DELETE FROM tag WHERE session_id = $1", &[id.into()])
+        .await?;
+    db.execute("DELETE FROM note WHERE session_id = $1", &[id.into()])
+        .await?;
+    annotations(db, entry).await.map(|()| true)
+}
+
+/// Tags and notes of a session.
+async fn annotations(db: &mut Db, entry: &SessionEntry) -> Result<(), sqlx::Error> {
+    let id = entry.headline.session_id.as_str();
     for tag in &entry.tags {
         let sql = "INSERT INTO tag (session_id, tag) VALUES ($1, $2)";
         db.execute(sql, &[id.into(), tag.into()]).await?;
@@ -280,9 +307,6 @@ async fn details(db: &mut Db, entry: &SessionEntry) -> Result<(), sqlx::Error> {
             ],
         )
         .await?;
-    }
-    for analysis in &entry.analyses {
-        self::analysis(db, id, analysis).await?;
     }
     Ok(())
 }

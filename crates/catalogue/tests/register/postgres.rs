@@ -4,7 +4,77 @@ use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError, Question};
 
 use crate::server::Server;
 use crate::support::{Lab, WAIT};
-use crate::{questions, synthetic};
+use crate::{questions, sessions, synthetic};
+
+/// Each role may do what its words say, and nothing of the next one.
+#[test]
+fn roles_allow_reading_annotating_and_recording() {
+    let Some(server) = Server::start() else {
+        return;
+    };
+    let lab = Lab::with_sessions(2);
+    let mut owner = server.open().unwrap();
+    owner.register(&[lab.session(0)]).unwrap();
+    owner.create_roles().unwrap();
+    owner.create_roles().unwrap();
+    server.execute(&[
+        "CREATE ROLE stranger LOGIN",
+        "CREATE ROLE reader LOGIN IN ROLE skinrig_read",
+        "CREATE ROLE annotator LOGIN IN ROLE skinrig_annotate",
+        "CREATE ROLE recorder LOGIN IN ROLE skinrig_record",
+        "CREATE ROLE keeper LOGIN IN ROLE skinrig_admin",
+    ]);
+    let denied = |result: Result<(), CatalogueError>| match result {
+        Err(e @ CatalogueError::Denied { .. }) => {
+            let words = e.to_string();
+            assert!(words.contains("skinrig catalogue roles --help"), "{words}");
+        }
+        other => panic!("{other:?}"),
+    };
+    denied(server.open_as("stranger", Access::Read).map(drop));
+    sessions::add_tag(&lab, 0);
+    let tags = || server.rows("postgres", "SELECT tag FROM tag");
+    let open = |user| server.open_as(user, Access::Write).unwrap();
+
+    let mut reader = open("reader");
+    assert_eq!(questions::ask(&mut reader, "unfinished", &[]).rows.len(), 1);
+    denied(reader.register_annotations(&[lab.session(0)]).map(drop));
+    denied(reader.register(&[lab.session(0)]).map(drop));
+    denied(reader.create_roles());
+    assert!(tags().is_empty());
+
+    let mut annotator = open("annotator");
+    let both = [lab.session(0), lab.session(1)];
+    let done = annotator.register_annotations(&both).unwrap();
+    assert_eq!(done.registered, ["0.session.sqlite"]);
+    assert_eq!(
+        done.unreadable[0].reason,
+        "not in the catalogue: register it first"
+    );
+    assert_eq!(tags(), ["Some(\"wet\")"]);
+    // Tags and notes are not all of a session: it stays stale.
+    let status = annotator.status(lab.path()).unwrap();
+    assert_eq!(status.stale.len(), 2, "{status:?}");
+    denied(annotator.register(&[lab.session(0)]).map(drop));
+    assert_eq!(tags(), ["Some(\"wet\")"]);
+
+    let mut recorder = open("recorder");
+    assert_eq!(
+        recorder
+            .refresh(lab.path(), false)
+            .unwrap()
+            .registered
+            .len(),
+        2
+    );
+    denied(recorder.create_roles());
+    assert_eq!(tags(), ["Some(\"wet\")"]);
+    let mut keeper = open("keeper");
+    assert_eq!(
+        keeper.refresh(lab.path(), true).unwrap().registered.len(),
+        2
+    );
+}
 
 #[test]
 fn a_server_gives_the_answers_of_the_embedded_catalogue() {
@@ -115,7 +185,10 @@ fn a_reader_asks_and_does_not_register() {
         assert_eq!(reader.status(lab.path()).unwrap().current, 1);
         assert_eq!(questions::ask(&mut reader, "rigs", &[]).rows.len(), 1);
         let refused = reader.refresh(lab.path(), true).unwrap_err();
-        assert!(matches!(refused, CatalogueError::Sql { .. }), "{refused:?}");
+        assert!(
+            matches!(refused, CatalogueError::Denied { .. }),
+            "{refused:?}"
+        );
     }
     let central = server.open().unwrap().status(lab.path()).unwrap();
     assert_eq!((central.current, central.stale.len()), (1, 0));

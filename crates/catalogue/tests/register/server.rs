@@ -104,10 +104,20 @@ impl Server {
 
     /// URL of a database; `postgres` is there from the start.
     pub(crate) fn url(&self, database: &str) -> String {
+        self.url_of("skinrig", database)
+    }
+
+    fn url_of(&self, user: &str, database: &str) -> String {
         format!(
-            "postgres://skinrig@localhost/{database}?host={}",
+            "postgres://{user}@localhost/{database}?host={}",
             self.own().display()
         )
+    }
+
+    /// Opens the catalogue of the first database as another user.
+    pub(crate) fn open_as(&self, user: &str, access: Access) -> Result<Catalogue, CatalogueError> {
+        let address = Address::parse(self.url_of(user, "postgres").as_ref());
+        Catalogue::open(address, access, WAIT)
     }
 
     pub(crate) fn address(&self) -> Address {

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use skinrig_catalogue::{Address, Question};
+use skinrig_catalogue::{Address, Question, ROLES};
 
 /// Arguments of `catalogue`.
 #[derive(Debug, Args)]
@@ -33,12 +33,26 @@ pub(crate) enum CatalogueCommand {
         `run`, `resume`, `import`, `analyze` and `tag` register their session by themselves.")]
     Register(RegisterArgs),
 
+    /// Create the roles of a catalogue on a server, and give them their rights.
+    #[command(after_help = roles_help())]
+    Roles(RolesArgs),
+
     /// Answer a question about all sessions; without a name, list the questions.
     #[command(
         after_help = "Examples:\n  skinrig catalogue query\n  skinrig catalogue query best-prototypes min_sessions=5\n  \
         skinrig catalogue query clock-drift camera=camera2 since=2026-01-01 --json"
     )]
     Query(QueryArgs),
+}
+
+fn roles_help() -> String {
+    let roles = ROLES.map(|role| format!("  {:<18}{}\n", role.name, role.may));
+    format!(
+        "Example:\n  skinrig catalogue roles --catalogue postgres://owner@db.lab/skins\n\nRoles:\n{}\n\
+        `GRANT skinrig_record TO bench1;` gives one to a user of the server. Call it again after an update of skinrig.\n\
+        `?sslmode=verify-full` at the end of an address demands an encrypted connection (builds with `--features tls`).",
+        roles.concat()
+    )
 }
 
 /// The catalogue to use.
@@ -99,6 +113,17 @@ pub(crate) struct RegisterArgs {
     #[arg(long, value_name = "FOLDER")]
     pub nights: Option<PathBuf>,
 
+    /// Replace only the tags and notes of these session files.
+    #[arg(long, conflicts_with = "nights")]
+    pub annotations: bool,
+
+    #[command(flatten)]
+    pub catalogue: CatalogueOption,
+}
+
+/// Arguments of `catalogue roles`.
+#[derive(Debug, Args)]
+pub(crate) struct RolesArgs {
     #[command(flatten)]
     pub catalogue: CatalogueOption,
 }

@@ -8,10 +8,12 @@ mod failure;
 use std::path::{Path, PathBuf};
 
 use skinrig_catalogue::{
-    Access, Address, Catalogue, FolderStatus, NightRegistration, Registration, Unreadable,
+    Access, Address, Catalogue, FolderStatus, NightRegistration, ROLES, Registration, Unreadable,
 };
 
-use self::args::{CatalogueArgs, CatalogueCommand, FolderArgs, RegisterArgs, StatusArgs};
+use self::args::{
+    CatalogueArgs, CatalogueCommand, FolderArgs, RegisterArgs, RolesArgs, StatusArgs,
+};
 use self::failure::{WAIT, failure};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::folder_of;
@@ -26,6 +28,7 @@ pub(crate) fn catalogue(args: &CatalogueArgs, json: bool) -> Outcome {
         CatalogueCommand::Rebuild(a) => rebuild(a, json),
         CatalogueCommand::Status(a) => status(a, json),
         CatalogueCommand::Register(a) => register(a, json),
+        CatalogueCommand::Roles(a) => roles(a, json),
         CatalogueCommand::Query(a) => answer::query(a, json),
     }
 }
@@ -62,7 +65,32 @@ fn status(args: &StatusArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
+fn roles(args: &RolesArgs, json: bool) -> Outcome {
+    let address = args.catalogue.of_folder(Path::new("sessions"));
+    let mut catalogue = open(address)?;
+    catalogue.create_roles().map_err(failure)?;
+    let place = catalogue.place().to_owned();
+    catalogue.close().map_err(failure)?;
+    if json {
+        let names = ROLES.map(|role| role.name);
+        crate::terminal::print_json(&serde_json::json!({ "catalogue": place, "roles": names }));
+        return Ok(Exit::Ok);
+    }
+    outln!("catalogue   {place}");
+    for role in ROLES {
+        outln!("{:<18}{}", role.name, role.may);
+    }
+    outln!(
+        "next        `GRANT {} TO USER;` on the server",
+        ROLES[0].name
+    );
+    Ok(Exit::Ok)
+}
+
 fn register(args: &RegisterArgs, json: bool) -> Outcome {
+    if args.annotations {
+        return register_annotations(args, json);
+    }
     if let [folder] = &args.sessions[..]
         && folder.is_dir()
     {
@@ -75,6 +103,25 @@ fn register(args: &RegisterArgs, json: bool) -> Outcome {
     let mut catalogue = open(args.catalogue.of_folder(&folder))?;
     let done = catalogue.register(&args.sessions).map_err(failure)?;
     finish(catalogue, &done, args.nights.as_deref(), json)?;
+    match done.unreadable.is_empty() {
+        true => Ok(Exit::Ok),
+        false => Ok(Exit::Input),
+    }
+}
+
+fn register_annotations(args: &RegisterArgs, json: bool) -> Outcome {
+    if let Some(folder) = args.sessions.iter().find(|path| path.is_dir()) {
+        return Err(Failure::input(format!(
+            "{}: expected session files with --annotations, found a folder\n  next: name the sessions that were tagged",
+            folder.display()
+        )));
+    }
+    let folder = one_folder(&args.sessions)?;
+    let mut catalogue = open(args.catalogue.of_folder(&folder))?;
+    let done = catalogue
+        .register_annotations(&args.sessions)
+        .map_err(failure)?;
+    finish(catalogue, &done, None, json)?;
     match done.unreadable.is_empty() {
         true => Ok(Exit::Ok),
         false => Ok(Exit::Input),
