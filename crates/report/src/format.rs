@@ -42,6 +42,29 @@ pub(crate) fn interval(e: &Estimate, scale: f64, digits: usize) -> String {
     }
 }
 
+/// A large estimate rounded to the second digit of half its interval, one decimal at most, and its number of decimals: more digits
+/// would say more than is known.
+pub(crate) fn rounded_to_interval(e: &Estimate) -> (Estimate, usize) {
+    const FINEST: f64 = 0.1;
+    let half = match (e.low, e.high) {
+        (Some(low), Some(high)) => (high - low) / 2.0,
+        _ => 0.0,
+    };
+    let place = if half.is_finite() && half > 0.0 {
+        10_f64.powf(half.log10().floor() - 1.0).max(FINEST)
+    } else {
+        FINEST
+    };
+    let round = |value: Option<f64>| value.map(|v| (v / place).round() * place);
+    let rounded = Estimate {
+        value: round(e.value),
+        low: round(e.low),
+        high: round(e.high),
+        n: e.n,
+    };
+    (rounded, usize::from(place < 1.0))
+}
+
 /// Contact map score of the public code with its interval. It compares two parts of the estimated map, so it is said which
 /// one is larger: brightness `missing` in the true cell, or brightness `outside` it.
 pub(crate) fn contact_map(e: &Estimate) -> String {
@@ -160,6 +183,30 @@ mod tests {
         assert_eq!(written(1.893), "1.9");
         assert_eq!(written(38.0), "38.0");
         assert_eq!(written(0.0), "0.000");
+    }
+
+    #[test]
+    fn a_large_estimate_has_no_more_digits_than_its_interval_gives() {
+        let written = |value, low, high| {
+            let e = Estimate {
+                value: Some(value),
+                low,
+                high,
+                n: 3,
+            };
+            let (rounded, digits) = rounded_to_interval(&e);
+            format!(
+                "{} {}",
+                number(rounded.value, digits),
+                interval(&rounded, 1.0, digits)
+            )
+        };
+        let with = |value, low, high| written(value, Some(low), Some(high));
+        assert_eq!(with(5853.1, 2501.8, 9666.0), "5900 [2500, 9700]");
+        assert_eq!(with(46.3, 40.2, 53.9), "46.3 [40.2, 53.9]");
+        assert_eq!(with(105.4, 80.2, 140.3), "105 [80, 140]");
+        assert_eq!(with(5853.1, 5853.0, 5853.2), "5853.1 [5853.0, 5853.2]");
+        assert_eq!(written(105.4, None, None), "105.4 –");
     }
 
     #[test]

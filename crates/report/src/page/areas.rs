@@ -4,7 +4,7 @@ use skinrig_analysis::result::{Analysis, Estimate};
 
 use super::cells::estimate;
 use crate::document::Table;
-use crate::format::{NONE, contact_map, interval, number};
+use crate::format::{NONE, contact_map, interval, number, rounded_to_interval};
 use crate::published;
 
 /// Areas and taxels beside the published ones.
@@ -49,10 +49,11 @@ pub(super) fn coverage(a: &Analysis) -> Option<Table> {
         " (52.7 %)",
     ));
     let taxels = |name: &str, e: &Estimate, theirs: f64| {
+        let (e, digits) = rounded_to_interval(e);
         [
             name.to_owned(),
-            number(e.value, 1),
-            interval(e, 1.0, 1),
+            number(e.value, digits),
+            interval(&e, 1.0, digits),
             theirs.to_string(),
         ]
     };

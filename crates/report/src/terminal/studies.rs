@@ -8,7 +8,7 @@ use skinrig_analysis::result::{
 use skinrig_text::Column as Cells;
 
 use crate::document::{Column, Note, Row, Section, Table};
-use crate::format::{interval, number};
+use crate::format::{interval, number, rounded_to_interval};
 use crate::page::indentation::line;
 
 /// Factors with their own line; the page lists all.
@@ -76,10 +76,14 @@ fn areas(a: &Analysis) -> Vec<Note> {
             c.locations
         );
         out.push(Note::new("area", text));
+        let taxels = |e| {
+            let (e, digits) = rounded_to_interval(e);
+            with(&e, 1.0, digits)
+        };
         let text = format!(
             "{} in the probed area; {} if the RMSE holds over the whole skin",
-            with(&c.taxels_probed, 1.0, 1),
-            with(&c.taxels_skin, 1.0, 1)
+            taxels(&c.taxels_probed),
+            taxels(&c.taxels_skin)
         );
         out.push(Note::new("taxels", text));
     }
