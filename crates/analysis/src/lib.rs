@@ -25,6 +25,7 @@ mod counters;
 pub mod coverage;
 pub mod dbscan;
 pub mod digits;
+mod distinct;
 mod error;
 pub mod estimators;
 mod event_cache;

@@ -2,6 +2,7 @@
 
 use skinrig_statistics::{ComparisonError, Interval, Sample, SampleFault, Settings};
 
+use crate::distinct::distinct;
 use crate::exact;
 use crate::result::Estimate;
 
@@ -53,9 +54,7 @@ impl Draws {
     pub(crate) fn ends_of_share(self, trials: &[(u32, bool)], times: u32) -> Option<(f64, f64)> {
         let sample = Sample::share_of_repeated(trials.iter().copied(), times);
         let ends = self.ends(Ok(sample))?;
-        let mut locations: Vec<u32> = trials.iter().map(|(location, _)| *location).collect();
-        locations.sort_unstable();
-        locations.dedup();
+        let locations = distinct(trials.iter().map(|(location, _)| *location));
         let successes = trials.iter().filter(|(_, is)| *is).count();
         let share = successes as f64 / trials.len() as f64;
         Some(exact::share(share, locations.len(), ends))

@@ -8,6 +8,7 @@ use skinrig_model::{CameraId, PressId};
 use super::finding::finding;
 use super::readings::{MIN_SPREAD_DEG, Path};
 use super::statistics::median;
+use crate::distinct::distinct;
 use crate::result::{Evidence, Fault, Finding, Law};
 
 /// Columns of a fixed pixel scatter by less than this, px.
@@ -107,9 +108,7 @@ fn scatter(values: Vec<f64>) -> Option<(f64, f64)> {
 /// on the column counts 1 and one elsewhere -[`ELSEWHERE`]. First index, and the one after the last.
 fn longest_stretch(columns: &Columns) -> Option<(usize, usize)> {
     let least = MIN_PRESSES.max((MIN_SHARE * columns.len() as f64).ceil() as usize) as i64;
-    let mut candidates: Vec<i64> = columns.iter().map(|c| libm::round(c.1) as i64).collect();
-    candidates.sort_unstable();
-    candidates.dedup();
+    let candidates = distinct(columns.iter().map(|c| libm::round(c.1) as i64));
     let stretches = candidates.into_iter().filter_map(|column| {
         let (sum, from, to) = stretch_on(columns, column as f64);
         let (_, angle_deg) = scatter(columns[from..to].iter().map(|c| c.2).collect())?;

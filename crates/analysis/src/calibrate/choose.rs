@@ -9,11 +9,12 @@ use super::crossval::Folds;
 use super::paired::{CHOICE, Difference, Losses, Step, select_model};
 use super::parameters::{MODELS, parameter_count};
 use super::{Fit, different_places, error_lengths, largest_supported, threshold};
+use crate::distinct::distinct;
 use crate::input::SessionInput;
 use crate::metrics::{rms_over_locations, spread_mm};
 use crate::result::{
-    CalibrationResult, Estimate, ModelComparison, ModelTest, PressResult, ThresholdChoice, Warning,
-    WarningCause,
+    CalibrationResult, Estimate, ModelComparison, PairedTest, PressResult, ThresholdChoice,
+    Warning, WarningCause,
 };
 use crate::sets::{CalibrationPress, CalibrationSet};
 use crate::verdict;
@@ -224,7 +225,7 @@ impl ModelCandidate {
         sights: &[CalibrationPress],
         settings: &AnalysisSettings,
         chosen: bool,
-        test: (Option<f64>, Option<ModelTest>),
+        test: (Option<f64>, Option<PairedTest<CalibrationModel>>),
     ) -> ModelComparison {
         let errors = self.errors_mm.as_deref();
         let values: Vec<(u32, f64)> = errors.map_or_else(Vec::new, |errors| {
@@ -267,7 +268,7 @@ fn candidates(
             };
             // Every fold needs as many distinct locations as parameters, like the whole set. If there are fewer positions
             // than locations, the folds have proportionally fewer.
-            let doubles = locations_of(sights).saturating_sub(places);
+            let doubles = distinct(locations(sights)).len().saturating_sub(places);
             if contender.is_determined()
                 && count + doubles <= folds.least_kept()
                 && let Some(fit) = &contender.fit
@@ -302,15 +303,13 @@ impl<'a> Comparison<'a> {
     }
 
     /// Bounded error of a candidate, and its comparison with the current one.
-    fn test(&self, i: usize, candidates: &[ModelCandidate]) -> (Option<f64>, Option<ModelTest>) {
+    fn test(
+        &self,
+        i: usize,
+        candidates: &[ModelCandidate],
+    ) -> (Option<f64>, Option<PairedTest<CalibrationModel>>) {
         let bounded = candidates[i].errors_mm.as_deref();
-        let test = self.steps[i].map(|step| ModelTest {
-            against: candidates[step.against].model,
-            gain_mm: step.difference.mm,
-            standard_error_mm: step.difference.standard_error_mm,
-            ratio: step.difference.ratio(),
-            needed: step.difference.needed,
-        });
+        let test = self.steps[i].map(|step| step.test(|at| candidates[at].model));
         (bounded.map(|e| self.losses.rms_mm(e)), test)
     }
 
@@ -363,11 +362,4 @@ fn calibration_warnings(result: &CalibrationResult, sights: &[CalibrationPress])
 
 fn locations(sights: &[CalibrationPress]) -> Vec<u32> {
     sights.iter().map(|s| s.location).collect()
-}
-
-fn locations_of(sights: &[CalibrationPress]) -> usize {
-    let mut all = locations(sights);
-    all.sort_unstable();
-    all.dedup();
-    all.len()
 }

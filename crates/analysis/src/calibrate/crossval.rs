@@ -7,6 +7,7 @@ use super::parameters::{Parameters, is_plausible, parameters_of, with_parameters
 use super::problem::Problem;
 use super::solver::minimise;
 use super::{best, error_lengths};
+use crate::distinct::distinct;
 use crate::sets::CalibrationPress;
 use skinrig_statistics::seeded;
 
@@ -26,9 +27,7 @@ pub(crate) struct Folds {
 impl Folds {
     /// Deals the locations to folds of equal size, in an order drawn from `seed`.
     pub(crate) fn deal(sights: &[CalibrationPress], seed: u64) -> Self {
-        let mut locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
-        locations.sort_unstable();
-        locations.dedup();
+        let locations = distinct(sights.iter().map(|s| s.location));
         let n = locations.len();
         let count = FOLDS.min(n);
         let mut fold_of: Vec<usize> = (0..n).map(|i| i % count.max(1)).collect();
@@ -50,9 +49,7 @@ impl Folds {
 
     /// One fold per repetition.
     pub(crate) fn by_repetition(sights: &[CalibrationPress]) -> Self {
-        let mut repetitions: Vec<u32> = sights.iter().map(|s| s.repetition).collect();
-        repetitions.sort_unstable();
-        repetitions.dedup();
+        let repetitions = distinct(sights.iter().map(|s| s.repetition));
         let of = |s: &CalibrationPress| repetitions.binary_search(&s.repetition).unwrap_or(0);
         Self {
             of_sight: sights.iter().map(of).collect(),

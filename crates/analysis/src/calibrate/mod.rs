@@ -24,6 +24,7 @@ mod uncertainty;
 use rayon::prelude::*;
 use skinrig_model::{CalibrationModel, StereoGeometry};
 
+use crate::distinct::distinct;
 use crate::result::CalibrationResult;
 use crate::sets::{CalibrationPress, CalibrationSet};
 pub use choose::{ModelChoice, choose};
@@ -86,15 +87,12 @@ fn largest_supported(places: usize, requested: CalibrationModel) -> CalibrationM
 /// Number of distinct locations of the plan, or of distinct measured positions if there are fewer.
 fn different_places(sights: &[CalibrationPress]) -> usize {
     let cell = |mm: f64| (mm / SAME_PLACE_MM).round() as i64;
-    let mut places: Vec<_> = sights
-        .iter()
-        .map(|s| (cell(s.truth.x_mm), cell(s.truth.y_mm)))
-        .collect();
-    places.sort_unstable();
-    places.dedup();
-    let mut locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
-    locations.sort_unstable();
-    locations.dedup();
+    let places = distinct(
+        sights
+            .iter()
+            .map(|s| (cell(s.truth.x_mm), cell(s.truth.y_mm))),
+    );
+    let locations = distinct(sights.iter().map(|s| s.location));
     places.len().min(locations.len())
 }
 

@@ -6,6 +6,8 @@
 
 use super::crossval::mean_difference;
 use super::{MIN_BOUND_MM, RAYLEIGH_MEDIAN};
+use crate::distinct::distinct;
+use crate::result::PairedTest;
 use skinrig_statistics::distributions::student_quantile;
 
 /// Bound on errors in robust standard deviations of one coordinate. Four in a million normal errors exceed it.
@@ -104,9 +106,7 @@ impl<'a> Losses<'a> {
         let (mean, error) = mean_difference(self.locations, &self.squares(a), &self.squares(b));
         let roots = self.rms_mm(a) + self.rms_mm(b);
         let scaled = |mm2: f64| if roots > 0.0 { mm2 / roots } else { 0.0 };
-        let mut places = self.locations.to_vec();
-        places.sort_unstable();
-        places.dedup();
+        let places = distinct(self.locations);
         Some(Difference {
             mm: scaled(mean),
             standard_error_mm: scaled(error?),
@@ -122,6 +122,19 @@ pub(crate) struct Step {
     pub against: usize,
     /// Error of the current model minus that of the candidate.
     pub difference: Difference,
+}
+
+impl Step {
+    /// The comparison as part of a result; `name` gives the model at an index.
+    pub(crate) fn test<T>(&self, name: impl FnOnce(usize) -> T) -> PairedTest<T> {
+        PairedTest {
+            against: name(self.against),
+            gain_mm: self.difference.mm,
+            standard_error_mm: self.difference.standard_error_mm,
+            ratio: self.difference.ratio(),
+            needed: self.difference.needed,
+        }
+    }
 }
 
 /// Chooses among nested models, smallest first: starting from the smallest, each larger one replaces the current one if its

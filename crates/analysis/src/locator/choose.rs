@@ -10,10 +10,10 @@ use super::spread::SpreadFits;
 use super::{Features, FitError, FittedLocator};
 use crate::calibrate::{Folds, Losses, NO_FIX_ERROR_MM, Refit, SessionCalibration, covariance};
 use crate::calibrate::{root_mean_square, select_model};
+use crate::distinct::distinct;
 use crate::metrics::rms_over_locations;
 use crate::result::{
-    CalibrationResult, LocatorComparison, LocatorFallback, LocatorResult, LocatorTest, Warning,
-    WarningCause,
+    CalibrationResult, LocatorComparison, LocatorFallback, LocatorResult, Warning, WarningCause,
 };
 use crate::sets::CalibrationSet;
 
@@ -139,10 +139,7 @@ impl<'a> Learner<'a> {
     }
 
     fn distinct_locations(&self) -> usize {
-        let mut all = self.locations.clone();
-        all.sort_unstable();
-        all.dedup();
-        all.len()
+        distinct(&self.locations).len()
     }
 
     fn choose(&self, effort: Effort) -> Option<LocatorChoice> {
@@ -189,13 +186,7 @@ impl<'a> Learner<'a> {
                 rmse_mm: rms_over_locations(&pairs, resamples, seed),
                 bounded_rmse_mm: errors.map(|e| losses.rms_mm(e)),
                 over_repetitions_mm: candidate.over_repetitions.as_deref().map(root_mean_square),
-                test: steps[i].map(|step| LocatorTest {
-                    against: candidates[step.against].method.locator(),
-                    gain_mm: step.difference.mm,
-                    standard_error_mm: step.difference.standard_error_mm,
-                    ratio: step.difference.ratio(),
-                    needed: step.difference.needed,
-                }),
+                test: steps[i].map(|step| step.test(|at| candidates[at].method.locator())),
                 unfit: candidate.fit.as_ref().err().copied(),
                 chosen: i == used,
             }

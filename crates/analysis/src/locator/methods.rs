@@ -12,6 +12,7 @@ use super::reading::{Reading, polynomials};
 use super::robust::reference_events;
 use super::samples::samples;
 use super::spread::SpreadFits;
+use crate::distinct::distinct;
 use crate::result::{CameraField, LocatorModel, PositionPrior};
 use crate::sets::{CalibrationPress, CalibrationSet};
 
@@ -248,9 +249,7 @@ fn rows(start: &FitStart<'_>) -> Option<Vec<Vec<f64>>> {
 }
 
 fn enough(needs: Requirements, presses: &[CalibrationPress]) -> Result<(), FitError> {
-    let mut locations: Vec<u32> = presses.iter().map(|p| p.location).collect();
-    locations.sort_unstable();
-    locations.dedup();
+    let locations = distinct(presses.iter().map(|p| p.location));
     let (needed, found) = (needs.locations, locations.len() as u32);
     if found < needed {
         return Err(FitError::Locations { needed, found });

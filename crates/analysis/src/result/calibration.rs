@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CalibrationModel, LensKind, StereoGeometry};
 
-use super::{Estimate, Termination};
+use super::{Estimate, PairedTest, Termination};
 
 /// A calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -67,27 +67,11 @@ pub struct ModelComparison {
     /// Comparison with the current model at its turn; `None` for the smallest model, and for one that could not be
     /// validated.
     #[serde(default)]
-    pub test: Option<ModelTest>,
+    pub test: Option<PairedTest<CalibrationModel>>,
     /// RMSE over its fitted presses, mm.
     pub fitted_rmse_mm: Option<f64>,
     /// True for the model in use.
     pub chosen: bool,
-}
-
-/// One step of the model choice: paired by location, errors bounded.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ModelTest {
-    /// The current model: the smallest, or the last accepted one.
-    pub against: CalibrationModel,
-    /// Bounded error of the current model minus that of this one, mm. Positive: this one is better.
-    pub gain_mm: f64,
-    /// Standard error of the gain over locations, mm.
-    pub standard_error_mm: f64,
-    /// Gain divided by its standard error; 0 if the gain is below 1e-6 mm.
-    pub ratio: f64,
-    /// Ratio required to replace the current model: Student's t at a level of 0.3 shared by all comparisons, with locations
-    /// - 1 degrees of freedom.
-    pub needed: f64,
 }
 
 /// Choice of the minimum number of cluster events, on the calibration presses.

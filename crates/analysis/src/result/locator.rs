@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::Locator;
 
-use super::Estimate;
+use super::{Estimate, PairedTest};
 use crate::locator::FitError;
 use crate::with_text::with_text;
 
@@ -79,26 +79,11 @@ pub struct LocatorComparison {
     /// RMSE in repetitions left out of its fit, mm; `None` for a single repetition.
     pub over_repetitions_mm: Option<f64>,
     /// Comparison with the current locator at its turn; `None` for the first.
-    pub test: Option<LocatorTest>,
+    pub test: Option<PairedTest<Locator>>,
     /// Why it could not be fitted.
     pub unfit: Option<FitError>,
     /// True for the locator in use.
     pub chosen: bool,
-}
-
-/// One step of the choice: paired by location, errors bounded.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LocatorTest {
-    /// The current locator.
-    pub against: Locator,
-    /// Bounded error of the current locator minus that of this one, mm. Positive: this one is better.
-    pub gain_mm: f64,
-    /// Standard error of the gain over locations, mm.
-    pub standard_error_mm: f64,
-    /// Gain divided by its standard error; 0 if the gain is below 1e-6 mm.
-    pub ratio: f64,
-    /// Ratio required to replace the current locator.
-    pub needed: f64,
 }
 
 /// Everything that a fitted locator needs besides the geometry.

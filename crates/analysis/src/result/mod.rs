@@ -16,6 +16,7 @@ mod latency;
 mod locator;
 mod motion;
 mod other_reading;
+mod paired_test;
 mod recalibration;
 mod reduction;
 mod reference;
@@ -31,7 +32,7 @@ pub use alignment::{
     RatesEvidence,
 };
 pub use audit::{Fault, Finding, Law};
-pub use calibration::{CalibrationResult, ModelComparison, ModelTest, ThresholdChoice};
+pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
 pub use campaign::CampaignLooks;
 pub use clock_map::{ClockMap, MapName};
 pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
@@ -51,12 +52,12 @@ pub use latency::{
 };
 pub use locator::{
     CameraField, FieldModel, FieldPoint, LocatorComparison, LocatorFallback, LocatorModel,
-    LocatorResult, LocatorTest, PositionPrior, Region, RegionLevel, ReliabilityRow, Scatter,
-    SpreadField,
+    LocatorResult, PositionPrior, Region, RegionLevel, ReliabilityRow, Scatter, SpreadField,
 };
 pub use motion::{Motion, MotionBin, PressMotion, TipSample};
 pub use other_reading::OtherReading;
 pub(crate) use other_reading::{Corner, FrameChange, Origin, OtherPlan, Turn};
+pub use paired_test::PairedTest;
 pub use recalibration::{CameraMove, EarlierSession, Move, Recalibration, RemountPart};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};

@@ -179,7 +179,7 @@ pub(crate) fn models() -> Vec<ModelComparison> {
         parameters,
         rmse_mm: estimate(validated, 0.2, 256),
         bounded_rmse_mm: Some(validated - 0.05),
-        test: (parameters > 0).then_some(ModelTest {
+        test: (parameters > 0).then_some(PairedTest {
             against: CalibrationModel::None,
             gain_mm: 5.87 - validated,
             standard_error_mm: 0.1,
@@ -454,7 +454,7 @@ pub(crate) fn locator() -> LocatorResult {
         compared: vec![
             row(Locator::Geometry, 3.0, false),
             LocatorComparison {
-                test: Some(LocatorTest {
+                test: Some(PairedTest {
                     against: Locator::Geometry,
                     gain_mm: 0.9,
                     standard_error_mm: 0.2,
