@@ -1,4 +1,4 @@
-//! Looks at a campaign that is under way: another process analyses the session file, and a replay repeats the recorded ones.
+//! Looks at a running campaign: a second process analyses the session file; a replay repeats the recorded looks.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -8,40 +8,22 @@ use skinrig_model::{HostTime, Look};
 
 use crate::args::TakeLookArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::subprocess::{NoAnswer, Subprocess, be_polite};
+use crate::subprocess::{AnswerMode, NoAnswer, Subprocess, lower_priority};
 
 /// The hidden command that takes one look.
 const TAKE_LOOK: &str = "take-look";
 
-/// How a run takes its looks.
-#[derive(Debug, Clone, Default)]
-pub(crate) enum LookMode {
-    /// While the run continues.
-    #[default]
-    Background,
-    /// While the time of the rig stands still.
-    Waiting,
-    /// As recorded: when, and the look that decided.
-    Recorded(Option<(HostTime, Look)>),
-}
+/// How a run takes its looks. Recorded: the look that decided, and its time.
+pub(crate) type LookMode = AnswerMode<Option<(HostTime, Look)>>;
 
 impl LookMode {
-    /// On the simulated rig, whose time stands still between two steps unless it runs in real time.
-    pub(crate) const fn of_simulation(real_time: bool) -> Self {
-        if real_time {
-            Self::Background
-        } else {
-            Self::Waiting
-        }
-    }
-
     /// Looks at the session at `path`.
     pub(crate) fn at(&self, path: &Path) -> Box<dyn Looks> {
         match self {
             Self::Recorded(decided) => Box::new(RecordedLooks(*decided)),
-            mode => Box::new(SessionLooks {
+            source => Box::new(SessionLooks {
                 session: path.to_owned(),
-                waits: matches!(mode, Self::Waiting),
+                waits: matches!(source, Self::Waiting),
                 process: None,
                 due: None,
                 done: VecDeque::new(),
@@ -62,7 +44,7 @@ impl Looks for RecordedLooks {
     }
 }
 
-/// Looks by a process each, one at a time.
+/// Takes each look in its own process, one at a time.
 struct SessionLooks {
     session: PathBuf,
     waits: bool,
@@ -124,15 +106,12 @@ impl SessionLooks {
     }
 }
 
-fn outcome(number: u32, answer: Result<String, NoAnswer>) -> LookOutcome {
-    let look = answer
-        .map_err(|e| e.to_string())
-        .and_then(|json| serde_json::from_str(&json).map_err(|e| e.to_string()));
-    match look {
+fn outcome(number: u32, answer: Result<Look, NoAnswer>) -> LookOutcome {
+    match answer {
         Ok(look) => LookOutcome::Taken(look),
-        Err(why) => LookOutcome::NotTaken {
+        Err(e) => LookOutcome::NotTaken {
             number,
-            why: LookFault::Failed(why),
+            why: LookFault::Failed(e.to_string()),
         },
     }
 }
@@ -142,7 +121,7 @@ fn outcome(number: u32, answer: Result<String, NoAnswer>) -> LookOutcome {
 /// # Errors
 /// [`Failure::input`] when there is no such look.
 pub(crate) fn take_look(args: &TakeLookArgs) -> Outcome {
-    be_polite();
+    lower_priority();
     let look = skinrig_results::take_look(&args.session, args.number)?;
     outln!(
         "{}",

@@ -1,4 +1,4 @@
-//! The sense of touch of a run: learns in a process of its own, and feels through the online estimator, or repeats what was felt.
+//! The sense of touch of a run: learns in a second process and feels through the online estimator; a replay repeats the recorded touches.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -10,37 +10,19 @@ use skinrig_protocol::Online;
 
 use crate::args::LearnSkinArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::subprocess::{NoAnswer, Subprocess, be_polite};
+use crate::subprocess::{AnswerMode, NoAnswer, Subprocess, lower_priority};
 
 /// The hidden command that learns.
 const LEARN_SKIN: &str = "learn-skin";
 
-/// How a run feels.
-#[derive(Debug, Clone, Default)]
-pub(crate) enum SenseMode {
-    /// While the run continues.
-    #[default]
-    Background,
-    /// While the time of the rig stands still.
-    Waiting,
-    /// As recorded.
-    Recorded(Vec<TouchEstimate>),
-}
+/// How a run feels touches.
+pub(crate) type SenseMode = AnswerMode<Vec<TouchEstimate>>;
 
 impl SenseMode {
-    /// On the simulated rig, whose time stands still between two steps unless it runs in real time.
-    pub(crate) const fn of_simulation(real_time: bool) -> Self {
-        if real_time {
-            Self::Background
-        } else {
-            Self::Waiting
-        }
-    }
-
     /// Feels the skin while the session at `path` is recorded.
     ///
     /// # Errors
-    /// If the system starts no thread.
+    /// If no thread can be started.
     pub(crate) fn at(
         &self,
         path: &Path,
@@ -77,7 +59,7 @@ impl TouchSense for RecordedTouches {
     fn poll(&mut self, now: HostTime) -> Option<SenseAnswer> {
         loop {
             let touch = self.0.pop_front_if(|touch| touch.t <= now)?;
-            // The run makes its reactions again.
+            // The replayed run reacts by itself.
             if matches!(touch.kind, TouchKind::Stopped | TouchKind::Lifted) {
                 continue;
             }
@@ -93,7 +75,7 @@ impl TouchSense for RecordedTouches {
     }
 }
 
-/// Feels by the bytes of a session, after another process has learnt from it.
+/// Feels touches in the bytes of a session, once a second process has learnt from its calibration presses.
 struct SessionSense {
     session: PathBuf,
     false_alarms_hz: f64,
@@ -104,11 +86,8 @@ struct SessionSense {
 }
 
 impl SessionSense {
-    fn learnt(&mut self, answer: Result<String, NoAnswer>) {
-        let skin = answer
-            .map_err(|e| e.to_string())
-            .and_then(|json| serde_json::from_str::<SkinModel>(&json).map_err(|e| e.to_string()));
-        match skin {
+    fn learnt(&mut self, answer: Result<SkinModel, NoAnswer>) {
+        match answer {
             Ok(skin) => {
                 self.answers.push_back(SenseAnswer::Ready {
                     places: skin.places(),
@@ -116,9 +95,10 @@ impl SessionSense {
                 });
                 self.worker.start(skin);
             }
-            Err(why) => self
-                .answers
-                .push_back(SenseAnswer::Off(SenseFault::NotLearnt(why))),
+            Err(e) => {
+                let fault = SenseFault::NotLearnt(e.to_string());
+                self.answers.push_back(SenseAnswer::Off(fault));
+            }
         }
     }
 }
@@ -222,12 +202,12 @@ fn located(host_us: i64, position: &Position, until_sd_ns: i64) -> SensedTouch {
     }
 }
 
-/// `skinrig learn-skin`: prints what the calibration presses of a session teach, as JSON.
+/// `skinrig learn-skin`: learns a [`SkinModel`] from the calibration presses of a session and prints it as JSON.
 ///
 /// # Errors
-/// [`Failure`] when they teach too little.
+/// [`Failure`] if the presses are unusable or too few.
 pub(crate) fn learn_skin(args: &LearnSkinArgs) -> Outcome {
-    be_polite();
+    lower_priority();
     let skin = skinrig_results::learn_skin(&args.session, args.false_alarms)?;
     outln!(
         "{}",

@@ -1,33 +1,61 @@
-//! Another process of skinrig that answers one question about a session that is under way.
+//! A second skinrig process that analyses the session of a running campaign and prints its answer as JSON.
 //!
-//! Another process, because closing a file drops the locks of its process on it, here those of the recorder; and because a
-//! run must survive whatever its analysis does.
+//! It is a process and not a thread for two reasons: closing a file releases all locks of the closing process on it, here
+//! those of the recorder; and a run must survive a crash of its analysis.
 
 use std::ffi::OsStr;
 use std::io::Read;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::JoinHandle;
 
-/// Politeness of such a process: the run comes first.
+use serde::de::DeserializeOwned;
+
+/// Added to the nice value of such a process: the run has priority.
 const NICE: i32 = 10;
 
-/// Lowers the priority of this process. A denied priority makes its answer no less right.
-pub(crate) fn be_polite() {
+/// Lowers the priority of this process. If the system refuses, the answer only costs the run more time.
+pub(crate) fn lower_priority() {
     let _ = rustix::process::nice(NICE);
 }
 
-/// Why there is no answer.
+/// How a run gets the answers of an analysis of its own session.
+#[derive(Debug, Clone, Default)]
+pub(crate) enum AnswerMode<R> {
+    /// From a process, while the run continues.
+    #[default]
+    Background,
+    /// From a process, while the run waits and the time of the rig stands still.
+    Waiting,
+    /// From a recorded run.
+    Recorded(R),
+}
+
+impl<R> AnswerMode<R> {
+    /// For the simulated rig, whose time stands still between two steps unless it runs in real time.
+    pub(crate) const fn of_simulation(real_time: bool) -> Self {
+        if real_time {
+            Self::Background
+        } else {
+            Self::Waiting
+        }
+    }
+}
+
+/// Failure to get an answer.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum NoAnswer {
-    /// It could not be started or read.
+    /// The process could not be started or read.
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    /// It said why.
+    /// The process failed with this message.
     #[error("{0}")]
-    Said(String),
-    /// It ended without a word.
+    Failed(String),
+    /// The process ended without a message.
     #[error("its process ended with {0}")]
     Ended(ExitStatus),
+    /// Its answer is not the expected JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
 }
 
 /// A running process; killed when dropped, so that it never delays the seal.
@@ -75,16 +103,16 @@ impl Subprocess {
         matches!(self.child.try_wait(), Ok(None))
     }
 
-    /// Waits for the end; returns what it printed.
-    pub(crate) fn finish(mut self) -> Result<String, NoAnswer> {
+    /// Waits for the end and returns the answer.
+    pub(crate) fn finish<T: DeserializeOwned>(mut self) -> Result<T, NoAnswer> {
         let ended = self.child.wait()?;
         let answer = text(self.answer.take())?;
         let message = text(self.message.take())?;
         if ended.success() {
-            return Ok(answer);
+            return Ok(serde_json::from_str(&answer)?);
         }
         let first = message.lines().next().map(str::to_owned);
-        Err(first.map_or(NoAnswer::Ended(ended), NoAnswer::Said))
+        Err(first.map_or(NoAnswer::Ended(ended), NoAnswer::Failed))
     }
 }
 
