@@ -4,9 +4,10 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteConnection;
 
 use crate::digest::{EarlierState, TableDigest, digest_earlier, tree_hash};
+use crate::from_row::digest_from;
 use crate::hex::hex;
 use crate::problem::Problem;
-use crate::query::{Fault, each_row, has_table, int, num, opt_int, sha, text};
+use crate::query::{Fault, each_row, has_table, int, num, opt_int, sha};
 use crate::rows::SessionTotals;
 use crate::totals;
 
@@ -19,6 +20,16 @@ pub(crate) enum PreviousSeal {
     Unverifiable,
     /// The rows differ from it.
     Mismatch(Vec<Problem>),
+}
+
+impl PreviousSeal {
+    fn unless(self, problems: Vec<Problem>) -> Self {
+        if problems.is_empty() {
+            self
+        } else {
+            Self::Mismatch(problems)
+        }
+    }
 }
 
 /// Archives the seal, if any, that leg `leg` removes from a file with schema version `schema`.
@@ -97,16 +108,15 @@ async fn check_previous_seal(
         (None, None) => return Ok(None),
         (Some(row), Some(tree)) => (row, tree),
         (row, _) => {
-            let locations = ["in its row", "in previous_seal"];
-            let (expected, found) = if row.is_some() {
-                (locations[1], locations[0])
+            let (there, missing) = if row.is_some() {
+                ("in previous_seal", "in its row")
             } else {
-                (locations[0], locations[1])
+                ("in its row", "in previous_seal")
             };
             let problem = Problem::new(
                 "previous seal",
-                format_args!("it {expected} and {found}"),
-                format_args!("it only {expected}"),
+                format_args!("it {there} and {missing}"),
+                format_args!("it only {there}"),
             );
             return Ok(Some(PreviousSeal::Mismatch(vec![problem])));
         }
@@ -121,11 +131,7 @@ async fn check_previous_seal(
         ));
     }
     if opt_int(&row, "schema_version")?.is_none() {
-        return Ok(Some(if problems.is_empty() {
-            PreviousSeal::Unverifiable
-        } else {
-            PreviousSeal::Mismatch(problems)
-        }));
+        return Ok(Some(PreviousSeal::Unverifiable.unless(problems)));
     }
     let schema = num(&row, "schema_version")?;
     let mut totals = SessionTotals {
@@ -137,11 +143,7 @@ async fn check_previous_seal(
     let mut recorded = Vec::new();
     let sql = "SELECT name, rows, sha256 FROM previous_table_digest WHERE leg = ? ORDER BY name";
     each_row(sqlx::query(sql).bind(leg.number), conn, |row| {
-        recorded.push(TableDigest {
-            name: text(row, "name")?,
-            rows: int(row, "rows")?,
-            sha256: sha(row, "sha256")?,
-        });
+        recorded.push(digest_from(row)?);
         Ok(())
     })
     .await?;
@@ -152,29 +154,7 @@ async fn check_previous_seal(
         tables: &recorded,
     };
     let computed = digest_earlier(conn, &earlier).await?;
-    for table in &computed {
-        if !recorded.contains(table) {
-            problems.push(Problem::new(
-                &table.name,
-                "the sealed rows of earlier legs",
-                "other rows",
-            ));
-        }
-    }
-    if computed.len() != recorded.len() {
-        problems.push(Problem::new(
-            "digests of tables",
-            computed.len(),
-            recorded.len(),
-        ));
-    }
-    if tree_hash(&computed) != tree {
-        problems.push(Problem::new(
-            "tree hash of the rows",
-            format_args!("{} of the previous seal", hex(&tree)),
-            hex(&tree_hash(&computed)),
-        ));
-    }
+    problems.extend(compare_digests(&recorded, &computed, &tree));
     let poses = recorded.iter().find(|t| t.name == "pose_block");
     let counted = totals::totals_before(conn, &earlier, poses.map_or(0, |t| t.rows)).await?;
     if counted != totals {
@@ -184,9 +164,33 @@ async fn check_previous_seal(
             format_args!("{counted:?}"),
         ));
     }
-    Ok(Some(if problems.is_empty() {
-        PreviousSeal::Verified
-    } else {
-        PreviousSeal::Mismatch(problems)
-    }))
+    Ok(Some(PreviousSeal::Verified.unless(problems)))
+}
+
+/// Differences between the digests in a seal and those of the rows.
+fn compare_digests(
+    recorded: &[TableDigest],
+    computed: &[TableDigest],
+    sealed_tree: &[u8; 32],
+) -> Vec<Problem> {
+    let changed = computed.iter().filter(|table| !recorded.contains(table));
+    let mut problems: Vec<Problem> = changed
+        .map(|table| Problem::new(&table.name, "the sealed rows of earlier legs", "other rows"))
+        .collect();
+    if computed.len() != recorded.len() {
+        problems.push(Problem::new(
+            "digests of tables",
+            computed.len(),
+            recorded.len(),
+        ));
+    }
+    let tree = tree_hash(computed);
+    if tree != *sealed_tree {
+        problems.push(Problem::new(
+            "tree hash of the rows",
+            format_args!("{} of the previous seal", hex(sealed_tree)),
+            hex(&tree),
+        ));
+    }
+    problems
 }

@@ -76,14 +76,7 @@ impl SessionWriter {
         lock.take_file()?;
         let conn = runtime.block_on(schema::create_schema(&path))?;
         lock.take_log()?;
-        let mut writer = Self {
-            lock,
-            path,
-            shared: Arc::new(Shared::default()),
-            threads: None,
-            phase: Phase::New,
-            offset: LegOffset::default(),
-        };
+        let mut writer = Self::locked(path, lock, Phase::New);
         writer.start(runtime, conn, Preparer::default(), 1)?;
         Ok(writer)
     }
@@ -100,14 +93,7 @@ impl SessionWriter {
     pub fn resume<S: ChunkScanner>(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let lock = resume::lock_unfinished::<S>(&path)?;
-        Ok(Self {
-            lock,
-            path,
-            shared: Arc::new(Shared::default()),
-            threads: None,
-            phase: Phase::Resuming,
-            offset: LegOffset::default(),
-        })
+        Ok(Self::locked(path, lock, Phase::Resuming))
     }
 
     /// Opens a session whose end is recorded but whose seal is missing: only [`finish`](Self::finish) remains to be called.
@@ -122,16 +108,21 @@ impl SessionWriter {
         let runtime = runtime(&path)?;
         let conn = runtime.block_on(resume::reopen(&path))?;
         lock.take_log()?;
-        let mut writer = Self {
-            lock,
+        let mut writer = Self::locked(path, lock, Phase::Ended);
+        writer.start(runtime, conn, Preparer::default(), 1)?;
+        Ok(writer)
+    }
+
+    /// A writer whose threads are not yet running.
+    fn locked(path: PathBuf, lock: WriterLock, phase: Phase) -> Self {
+        Self {
             path,
             shared: Arc::new(Shared::default()),
             threads: None,
-            phase: Phase::Ended,
+            phase,
             offset: LegOffset::default(),
-        };
-        writer.start(runtime, conn, Preparer::default(), 1)?;
-        Ok(writer)
+            lock,
+        }
     }
 
     /// Starts both threads on an open file.

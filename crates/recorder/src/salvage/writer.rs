@@ -1,6 +1,7 @@
 //! Copies recovered rows into the new file, validating each one, and lists what is missing.
 
 use std::io;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
@@ -103,11 +104,7 @@ impl SalvageWriter<'_> {
         shape: &TableShape,
         rows: &TableRows,
     ) -> Result<SalvagedTable, SalvageError> {
-        let mut table = SalvagedTable {
-            name: shape.kind.name.to_owned(),
-            rows: 0,
-            missing: rows.torn,
-        };
+        let mut table = no_rows_yet(shape, rows);
         for (n, found) in rows.rows.values().enumerate() {
             if n % ROWS_PER_COMMIT == ROWS_PER_COMMIT - 1 {
                 self.commit().await?;
@@ -173,11 +170,7 @@ impl SalvageWriter<'_> {
         shape: &TableShape,
         rows: &TableRows,
     ) -> Result<SalvagedTable, SalvageError> {
-        let mut table = SalvagedTable {
-            name: shape.kind.name.to_owned(),
-            rows: 0,
-            missing: rows.torn,
-        };
+        let mut table = no_rows_yet(shape, rows);
         let (mut fillers, mut beyond) = (MAX_MISSING, 0u64);
         for camera in CameraId::ALL {
             let (mut next, mut host_ns, mut range) = (0i64, 0i64, None::<MissingRange>);
@@ -201,29 +194,13 @@ impl SalvageWriter<'_> {
                 }
                 fillers -= seq - next;
                 if seq > next {
-                    extend_range(&mut range, camera, next, seq - 1, 0, false);
+                    extend_range(&mut range, camera, next..=seq - 1, None);
                 }
                 next = seq + 1;
                 let row = gather::read(self.pages, shape, found)?;
                 let Some(row) = row.filter(|row| is_intact(shape, row)) else {
                     let begun = gather::read_leading(self.pages, shape, found)?;
-                    let lost = [LOST_BEFORE, RAW_BYTES].map(|i| begun.get(i));
-                    let bytes = match lost {
-                        [Some(Value::Int(a)), Some(Value::Int(b))]
-                            if (0..=MAX_BYTES).contains(a) && (0..=MAX_BYTES).contains(b) =>
-                        {
-                            Some(a + b)
-                        }
-                        _ => None,
-                    };
-                    extend_range(
-                        &mut range,
-                        camera,
-                        seq,
-                        seq,
-                        bytes.unwrap_or(0),
-                        bytes.is_some(),
-                    );
+                    extend_range(&mut range, camera, seq..=seq, stated_bytes(&begun));
                     continue;
                 };
                 if let Some(range) = range.take() {
@@ -235,7 +212,7 @@ impl SalvageWriter<'_> {
                 if self.insert(shape, row).await? {
                     table.rows += 1;
                 } else {
-                    extend_range(&mut range, camera, seq, seq, 0, false);
+                    extend_range(&mut range, camera, seq..=seq, None);
                 }
             }
             if let Some(range) = range.take() {
@@ -345,24 +322,43 @@ const UNKNOWN_LOSS_BYTES: i64 = 8;
 /// Largest plausible loss in a row, bytes.
 const MAX_BYTES: i64 = 1 << 40;
 
+fn no_rows_yet(shape: &TableShape, rows: &TableRows) -> SalvagedTable {
+    SalvagedTable {
+        name: shape.kind.name.to_owned(),
+        rows: 0,
+        missing: rows.torn,
+    }
+}
+
+/// Bytes lost with a damaged chunk: those lost before it and its own, from the readable start of its row.
+fn stated_bytes(begun: &[Value]) -> Option<i64> {
+    match (begun.get(LOST_BEFORE), begun.get(RAW_BYTES)) {
+        (Some(Value::Int(before)), Some(Value::Int(own)))
+            if (0..=MAX_BYTES).contains(before) && (0..=MAX_BYTES).contains(own) =>
+        {
+            Some(before + own)
+        }
+        _ => None,
+    }
+}
+
+/// Adds missing chunks to `range`. `bytes`: how much was lost with them, if known.
 fn extend_range(
     range: &mut Option<MissingRange>,
     camera: CameraId,
-    from: i64,
-    to: i64,
-    bytes: i64,
-    known: bool,
+    chunks: RangeInclusive<i64>,
+    bytes: Option<i64>,
 ) {
     let range = range.get_or_insert(MissingRange {
         camera,
-        first_seq: from,
-        last_seq: to,
+        first_seq: *chunks.start(),
+        last_seq: *chunks.end(),
         bytes: 0,
         all_known: true,
     });
-    range.last_seq = to;
-    range.bytes += bytes;
-    range.all_known &= known;
+    range.last_seq = *chunks.end();
+    range.bytes += bytes.unwrap_or(0);
+    range.all_known &= bytes.is_some();
 }
 
 /// Whether a long row matches its stored hash. Other rows have none.

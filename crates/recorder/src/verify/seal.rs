@@ -5,9 +5,10 @@ use std::sync::mpsc::Receiver;
 
 use super::report::VerifyReport;
 use crate::digest::{TableDigest, digest_tables_beside, tree_hash};
+use crate::from_row::digest_from;
 use crate::hex::hex;
 use crate::lock::WriterLock;
-use crate::query::{each_row, int, num, sha, text};
+use crate::query::{each_row, num};
 use crate::reader::SessionReader;
 use crate::seal::{self, Stamp};
 
@@ -30,11 +31,7 @@ pub(super) fn check(
         let mut recorded = Vec::new();
         let query = sqlx::query("SELECT name, rows, sha256 FROM table_digest");
         each_row(query, conn, |row| {
-            recorded.push(TableDigest {
-                name: text(row, "name")?,
-                rows: int(row, "rows")?,
-                sha256: sha(row, "sha256")?,
-            });
+            recorded.push(digest_from(row)?);
             Ok(())
         })
         .await?;
