@@ -13,7 +13,7 @@ use skinrig_report::{Summary, Variant};
 
 use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
-use crate::paths::{beside, folder_of};
+use crate::paths::{beside, folder_of, stem};
 use crate::selection::SelectedPresses;
 
 pub(crate) use self::stored::{stored, stored_of};
@@ -145,12 +145,7 @@ pub(crate) fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
         name,
     };
     let official = results_path(session, None).is_file().then(|| listed(None));
-    let stem = beside(session, ANALYSIS_MARK);
-    let stem = stem
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let stem = format!("{}{ANALYSIS_MARK}", stem(session));
     let entries = std::fs::read_dir(folder_of(session))
         .into_iter()
         .flatten()

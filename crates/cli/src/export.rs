@@ -12,7 +12,7 @@ use skinrig_recorder::{SessionReader, tags_path};
 use crate::analysis_request::AnalysisRequest;
 use crate::args::{ExportArgs, ExportKind, ExportTable};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::{SESSION_SUFFIX, beside};
+use crate::paths::{SESSION_SUFFIX, beside, file_name, stem};
 use crate::results::{self, Results};
 use crate::selection::{self, Target};
 use crate::signature;
@@ -88,12 +88,7 @@ fn folder(args: &ExportArgs, target: &Target, ending: &str) -> Result<Folder, Fa
             path.display()
         )));
     }
-    let stem = beside(session, "");
-    let mut stem = stem
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let mut stem = stem(session);
     if let Some(selected) = &target.selected {
         stem = format!("{stem}.{}", selected.label());
     }
@@ -385,11 +380,7 @@ pub(crate) fn bundle(
     }
     let (files, invalid) = derived(session, reader, header, folder)?;
     written.extend(files);
-    let name = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default();
-        name.to_string_lossy().into_owned()
-    };
-    let names: Vec<String> = written.iter().map(name).collect();
+    let names: Vec<String> = written.iter().map(|path| file_name(path)).collect();
     let session_id = reader.session_id().map_err(Failure::session)?;
     skinrig_export::seal_bundle(
         folder.path(),

@@ -6,8 +6,7 @@ use chrono::{DateTime, Utc};
 
 use crate::exit::Failure;
 
-/// The ending of every session file.
-pub(crate) const SESSION_SUFFIX: &str = ".session.sqlite";
+pub(crate) use skinrig_recorder::SESSION_SUFFIX;
 
 /// Reads a text file that the user names; `next` is what to do if it cannot be read.
 ///
@@ -54,15 +53,27 @@ pub(crate) fn new_session(
     Ok(path)
 }
 
+/// File name without its folder; invalid UTF-8 is replaced.
+#[must_use]
+pub(crate) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Common start of the names of `session` and the files beside it.
+#[must_use]
+pub(crate) fn stem(session: &Path) -> String {
+    let name = file_name(session);
+    match name.strip_suffix(SESSION_SUFFIX) {
+        Some(stem) => stem.to_owned(),
+        None => name,
+    }
+}
+
 /// The file beside `session` with another ending, for example `.report.html`.
 #[must_use]
 pub(crate) fn beside(session: &Path, suffix: &str) -> PathBuf {
-    let name = session
-        .file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    let stem = name.strip_suffix(SESSION_SUFFIX).unwrap_or(&name);
-    session.with_file_name(format!("{stem}{suffix}"))
+    session.with_file_name(format!("{}{suffix}", stem(session)))
 }
 
 /// The folder of a session; the current folder for a bare name.

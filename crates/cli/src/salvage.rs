@@ -1,19 +1,21 @@
 //! `skinrig salvage`.
 
-use std::path::{Path, PathBuf};
-
 use skinrig_recorder::{SESSION_SUFFIX, SalvageReport, salvage as recover};
 use skinrig_text::{Column, Table};
 
 use crate::args::SalvageArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::beside;
 
 /// Copies the intact part of a damaged session into a new one, and lists what was lost.
 ///
 /// # Errors
 /// [`Failure::input`] when the file holds no session data or the new file exists; [`Failure::limit`] when something is lost.
 pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
-    let to = args.out.clone().unwrap_or_else(|| beside(&args.session));
+    let to = args
+        .out
+        .clone()
+        .unwrap_or_else(|| beside(&args.session, &format!(".salvaged{SESSION_SUFFIX}")));
     let report = recover(&args.session, &to).map_err(Failure::session)?;
     if json {
         let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;
@@ -34,13 +36,6 @@ pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
             to.display()
         )))
     }
-}
-
-/// `NAME.salvaged.session.sqlite` beside the damaged file.
-fn beside(session: &Path) -> PathBuf {
-    let name = session.file_name().unwrap_or_default().to_string_lossy();
-    let stem = name.strip_suffix(SESSION_SUFFIX).unwrap_or(&name);
-    session.with_file_name(format!("{stem}.salvaged{SESSION_SUFFIX}"))
 }
 
 fn print(report: &SalvageReport) {

@@ -9,6 +9,7 @@ use skinrig_text::{Column, Table, cut};
 
 use crate::args::SessionsArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::file_name;
 use crate::shelf::Shelf;
 
 /// Lists the sessions of a folder.
@@ -199,8 +200,7 @@ pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(refused)? {
         let path = entry.map_err(refused)?.path();
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
-        if name.is_some_and(|n| n.ends_with(SESSION_SUFFIX)) {
+        if file_name(&path).ends_with(SESSION_SUFFIX) {
             found.push(path);
         }
     }
@@ -216,10 +216,7 @@ fn modified_at(session: &Path) -> Option<SystemTime> {
 }
 
 fn line(table: &Table, session: &SessionSummary) -> String {
-    let name = session.path.file_name();
-    let file = name
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default();
+    let file = file_name(&session.path);
     match &session.state {
         SessionState::Empty if writer_of(&session.path).is_some() => format!("beginning: {file}"),
         SessionState::Empty => format!("empty: {file}: it has no records; remove it"),

@@ -9,6 +9,7 @@ use serde::Serialize;
 use skinrig_export::SIGNATURE_ENDING;
 
 use crate::exit::Failure;
+use crate::paths::file_name;
 
 /// The program; part of OpenSSH.
 const PROGRAM: &str = "ssh-keygen";
@@ -185,11 +186,7 @@ pub(crate) fn verify(
     if !any.status.success() {
         return Err(SignatureError::Invalid {
             path,
-            signed: file
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            signed: file_name(file),
             says: said(&any),
         });
     }

@@ -19,6 +19,7 @@ use crate::analyses::tradeoff_path;
 use crate::analysis_request::AnalysisRequest;
 use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::file_name;
 use crate::phase::Phase;
 use crate::results::{not_official, open, write};
 use crate::selection;
@@ -306,12 +307,8 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         .clone()
         .unwrap_or_else(|| tradeoff_path(&target.path, variant.as_ref().map(|v| v.name.as_str())));
     let json_path = html_path.with_extension("json");
-    let name = target
-        .path
-        .file_name()
-        .map(|n| n.to_string_lossy().into_owned());
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
-    let html = page(result, &name.unwrap_or_default(), &rig);
+    let html = page(result, &file_name(&target.path), &rig);
     write(&html_path, html.as_bytes())?;
     write(&json_path, text.as_bytes())?;
     if output.json {

@@ -14,7 +14,7 @@ use crate::analyses;
 use crate::args::VerifyArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
-use crate::paths::{SESSION_SUFFIX, beside};
+use crate::paths::{SESSION_SUFFIX, file_name, stem};
 use crate::phase::Phase;
 use crate::selection;
 use crate::signature;
@@ -145,9 +145,9 @@ pub(crate) fn check_bundle(
     if wrong.is_empty() {
         let rebuilt = compare_with_rebuilt(folder, &report, scratch)?;
         report.problems.extend(rebuilt);
-        let stem = beside(&inside, "");
-        let stem = stem.file_name().unwrap_or_default().to_string_lossy();
-        let copy = scratch.path().join(format!("{stem}{SESSION_SUFFIX}"));
+        let copy = scratch
+            .path()
+            .join(format!("{}{SESSION_SUFFIX}", stem(&inside)));
         let content = seal.map(|s| s.content_sha256());
         checked.analysis = analyses::stored_of(&copy, (&id, content.as_deref()), None);
         checked.content_sha256 = content.unwrap_or_default();
@@ -166,19 +166,14 @@ fn compare_with_rebuilt(
     let inside = folder.join(&report.session);
     let reader = SessionReader::open(&inside).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
-    let stem = beside(&inside, "");
-    let stem = stem.file_name().unwrap_or_default().to_string_lossy();
+    let stem = stem(&inside);
     let scratch = Folder::new(place.path(), &stem, false).map_err(Failure::internal)?;
     let (made, _) = export::derived(&inside, &reader, &header, &scratch)?;
     let software = crate::version::SOFTWARE;
     let mut known = BTreeSet::from([report.session.clone(), format!("{stem}{}", export::TAGS)]);
     let mut problems = Vec::new();
     for file in made {
-        let name = file
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let name = file_name(&file);
         let bundled = folder.join(&name);
         if report.problems.iter().any(|p| p.place == name) {
             // The manifest already tells that it is missing or another one.

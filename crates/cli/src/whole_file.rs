@@ -5,6 +5,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::paths::folder_of;
+
 /// Separates a file's name from the number of its unfinished copy.
 const PARTIAL: &str = ".partial-";
 
@@ -56,16 +58,15 @@ fn create_partial(path: &Path) -> io::Result<(PathBuf, File)> {
 
 /// Removes copies left by processes that were killed while writing; these are no longer locked.
 fn remove_leftovers(path: &Path) {
-    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
+    let Some(name) = path.file_name() else {
         return;
     };
-    let folder = if folder.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        folder
-    };
     let prefix = format!("{}{PARTIAL}", name.to_string_lossy());
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+    for entry in fs::read_dir(folder_of(path))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
         let is_copy = entry.file_name().to_string_lossy().starts_with(&prefix);
         if !is_copy || entry.file_type().is_ok_and(|t| !t.is_file()) {
             continue;

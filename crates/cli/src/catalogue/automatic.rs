@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError};
 
-use crate::paths::folder_of;
+use crate::paths::{file_name, folder_of};
 
 /// Longest wait for another program that writes the catalogue, such as a second run that ends at the same moment.
 pub(crate) const WAIT: Duration = Duration::from_millis(200);
@@ -31,10 +31,7 @@ pub(crate) fn register_stale(folder: &Path, sessions: &[PathBuf]) {
             Catalogue::open(Address::of_folder(folder), Access::Write, super::WAIT)?;
         let stale = catalogue.status(folder)?.stale;
         let stale: BTreeSet<String> = stale.into_iter().map(|stale| stale.file).collect();
-        let is_stale = |path: &&PathBuf| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            path.is_file() && stale.contains(name.as_ref())
-        };
+        let is_stale = |path: &&PathBuf| path.is_file() && stale.contains(&file_name(path));
         let stale: Vec<PathBuf> = sessions.iter().filter(is_stale).cloned().collect();
         catalogue.register(&stale)?;
         catalogue.close()

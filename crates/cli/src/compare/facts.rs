@@ -10,6 +10,7 @@ use skinrig_protocol::{Protocol, setting_doc};
 use skinrig_recorder::SessionReader;
 
 use crate::exit::Failure;
+use crate::paths::file_name;
 use skinrig_results::{Origin, RigDocument};
 
 /// Protocol keys that are compared elsewhere, or that only label the protocol.
@@ -92,10 +93,7 @@ pub(super) fn facts(
     let doc = |path: &String| Some((path.clone(), setting_doc(path)?.to_owned()));
     let docs = values.keys().filter_map(doc).collect();
     Ok(SessionFacts {
-        file: path
-            .file_name()
-            .map(|n| n.to_string_lossy().into_owned())
-            .unwrap_or_default(),
+        file: file_name(path),
         session_id: reader.session_id().map_err(unreadable)?,
         prototype: header.prototype.clone(),
         started: header.started_at.clone(),

@@ -11,6 +11,7 @@ use skinrig_protocol::{Plan, Protocol};
 use super::real_bench::RealBench;
 use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
+use crate::paths::file_name;
 use crate::results;
 use crate::rig::{bench, gates};
 use crate::{check, online, run};
@@ -47,7 +48,7 @@ pub(super) fn run(bench: &mut RealBench, file: &Path) -> Result<CampaignRun, Pro
     evidence.extend(run_evidence::from_report(&report));
     let mut campaign = CampaignRun {
         files: GoldenSession {
-            session: name(&session),
+            session: file_name(&session),
             report: None,
             results_sha256: None,
         },
@@ -104,12 +105,7 @@ fn protocol(bench: &RealBench, file: &Path) -> Result<(Protocol, Plan), Problem>
 fn analyze(session: &Path) -> Result<(results::Results, String), Failure> {
     let results = results::analyze_session(session, AnalysisRequest::default())?;
     let (_, html) = results::write_results(&results, None, None)?;
-    Ok((results, name(&html)))
-}
-
-fn name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
+    Ok((results, file_name(&html)))
 }
 
 fn problem(kind: EvidenceKind, subject: &str, failure: &Failure) -> Problem {

@@ -31,6 +31,7 @@ use crate::conclusion::conclude;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::FaultInjector;
 use crate::looks::LookMode;
+use crate::paths::file_name;
 use crate::run::{RunInputs, record};
 use crate::sense::SenseMode;
 use crate::signals::Operator;
@@ -215,12 +216,6 @@ fn check_positions(path: &Path, schedule: &Schedule, points: &[Point2]) -> Resul
         )));
     }
     Ok(())
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name()
-        .map(|n| n.to_string_lossy().into_owned())
-        .unwrap_or_default()
 }
 
 /// Lower-case hex SHA-256 of a file, which identifies it in the session.

@@ -10,6 +10,7 @@ use skinrig_protocol::{Publication, Selection};
 use super::card::{Published, card};
 use super::headline::{self, Headline, Number};
 use crate::exit::Failure;
+use crate::paths::file_name;
 
 /// Folder of the results with the selection.
 pub(super) const SELECTED: &str = "selected";
@@ -20,12 +21,6 @@ const CARD: &str = "README.md";
 
 /// Derives the numbers again.
 const SCRIPT: &str = "#!/bin/sh\n# Compares every file with its checksum and derives every number again.\nexec skinrig reproduce \"$(dirname \"$0\")\" \"$@\"\n";
-
-/// Name of a file without its folders.
-pub(super) fn file_name(path: &str) -> String {
-    let name = Path::new(path).file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
-}
 
 /// The file of a session's protocol.
 pub(super) fn protocol_file(bundle: &str) -> String {
@@ -55,7 +50,7 @@ pub(super) fn documents(
         let text = session.protocol_text.clone();
         (protocol_file(&session.bundle), text.into_bytes())
     }));
-    files.extend(selection.map(|(s, bytes)| (file_name(&s.file_name), bytes.to_vec())));
+    files.extend(selection.map(|(s, bytes)| (file_name(Path::new(&s.file_name)), bytes.to_vec())));
     Ok(files)
 }
 

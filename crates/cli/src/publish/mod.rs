@@ -16,12 +16,12 @@ use skinrig_protocol::{Publication, Selection};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use self::card::Published;
-use self::documents::{ABOUT, SELECTED, description, documents, file_name, protocol_file};
+use self::documents::{ABOUT, SELECTED, description, documents, protocol_file};
 use self::headline::{FORMAT, Headline, Number, SelectionEntry, SessionNumbers};
 use crate::args::PublishArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
-use crate::paths::{SESSION_SUFFIX, beside};
+use crate::paths::{SESSION_SUFFIX, file_name, stem};
 use crate::results::{self, write};
 use crate::selection::{self, SelectedPresses, Target, Targets};
 use crate::version::SOFTWARE;
@@ -128,12 +128,7 @@ fn stems(targets: &Targets) -> Result<Vec<String>, Failure> {
     let mut seen: BTreeMap<String, &Path> = BTreeMap::new();
     let mut stems = Vec::new();
     for target in &targets.sessions {
-        let stem = beside(&target.path, "");
-        let stem = stem
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let stem = stem(&target.path);
         if let Some(before) = seen.insert(stem.clone(), &target.path) {
             return Err(Failure::input(format!(
                 "{}: expected another file name, found that of {}\n  next: copy one session to a file with another name",
@@ -148,7 +143,7 @@ fn stems(targets: &Targets) -> Result<Vec<String>, Failure> {
 
 /// The bytes of the selection's file, whose name no other file of the crate has.
 fn named_apart(selection: &Selection, stems: &[String]) -> Result<Vec<u8>, Failure> {
-    let name = file_name(&selection.file_name);
+    let name = file_name(Path::new(&selection.file_name));
     let is_protocol = |stem: &String| name == protocol_file(&format!("{stem}.bundle"));
     if name == ABOUT || stems.iter().any(is_protocol) {
         return Err(Failure::input(format!(
@@ -189,7 +184,7 @@ fn names_in(folder: &Path) -> Result<Vec<String>, Failure> {
 
 fn entry(selection: &Selection) -> SelectionEntry {
     SelectionEntry {
-        file: file_name(&selection.file_name),
+        file: file_name(Path::new(&selection.file_name)),
         name: selection.name.clone(),
         sha256: selection.sha256.clone(),
     }
