@@ -7,6 +7,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinrig_controller::{Progress, ProgressTracker};
 use skinrig_model::{CameraId, HostDuration, PlannedPress, PressHistory, PressRole, Record};
 
+use crate::remote::{LivePress, RunSnapshot};
+
 /// Shortest interval between redraws of the bar.
 const REDRAW_EVERY: Duration = Duration::from_millis(100);
 
@@ -153,12 +155,7 @@ fn where_and_when(tracker: &ProgressTracker, waited: Duration) -> String {
 }
 
 /// Remaining time for the user, and the remaining rig time if the rig runs at another pace.
-#[must_use]
-pub(crate) fn eta_text(
-    elapsed: HostDuration,
-    rig: Option<HostDuration>,
-    waited: Duration,
-) -> String {
+fn eta_text(elapsed: HostDuration, rig: Option<HostDuration>, waited: Duration) -> String {
     let Some(rig) = rig.filter(|_| elapsed.0 > 0) else {
         return "-".into();
     };
@@ -168,6 +165,28 @@ pub(crate) fn eta_text(
         wait
     } else {
         format!("{wait} ({} of rig time)", clock_text(rig))
+    }
+}
+
+/// `0:11:00 of rig time in this leg; eta 0:00:08`
+#[must_use]
+pub(crate) fn time_text(live: &RunSnapshot) -> String {
+    let seconds = HostDuration::from_secs_f64;
+    let elapsed = seconds(live.elapsed_s);
+    let waited = Duration::try_from_secs_f64(live.waited_s).unwrap_or_default();
+    format!(
+        "{} of rig time in this leg; eta {}",
+        clock_text(elapsed),
+        eta_text(elapsed, live.eta_s.map(seconds), waited)
+    )
+}
+
+/// `sync` or `repetition 2`.
+#[must_use]
+pub(crate) fn block_text(press: &LivePress) -> String {
+    match press.role {
+        PressRole::Sync => "sync".to_owned(),
+        PressRole::Calibrate | PressRole::Score => format!("repetition {}", press.repetition),
     }
 }
 

@@ -21,7 +21,7 @@ pub(crate) use board::Remote;
 pub(crate) use client::{ask, follow};
 pub(crate) use error::RemoteError;
 pub(crate) use wire::{
-    LiveTouch, MOST_NAME_CHARS, NewestEvents, Reply, Request, RunRequest, RunSnapshot,
+    LivePress, LiveTouch, MOST_NAME_CHARS, NewestEvents, Reply, Request, RunRequest, RunSnapshot,
 };
 
 /// This system has no Unix sockets.

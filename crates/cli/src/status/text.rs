@@ -1,11 +1,11 @@
 //! Terminal text of `skinrig status`.
 
-use skinrig_model::{HostDuration, RunEnd};
+use skinrig_model::RunEnd;
 use skinrig_recorder::{PressTally, SessionTotals};
 use skinrig_text::{LongWords, hang};
 
 use super::state::{LastOutcome, Status, Stored};
-use crate::progress::{clock_text, eta_text};
+use crate::progress::{block_text, time_text};
 use crate::remote::RunSnapshot;
 use crate::rig::gates;
 
@@ -126,10 +126,7 @@ fn print_latest(stored: &Stored) {
 
 fn print_live(live: &RunSnapshot) {
     let press = live.press.as_ref().map_or_else(String::new, |p| {
-        let block = match p.role {
-            skinrig_model::PressRole::Sync => "sync".to_owned(),
-            _ => format!("repetition {}", p.repetition),
-        };
+        let block = block_text(p);
         let [x, y] = p.at_mm;
         format!(" ({block}, at ({x:.1}, {y:.1}) mm)")
     });
@@ -145,15 +142,7 @@ fn print_live(live: &RunSnapshot) {
         live.retaken
     );
     line("press", &text);
-    let seconds = HostDuration::from_secs_f64;
-    let elapsed = seconds(live.elapsed_s);
-    let waited = std::time::Duration::try_from_secs_f64(live.waited_s).unwrap_or_default();
-    let text = format!(
-        "{} of rig time in this leg; eta {}",
-        clock_text(elapsed),
-        eta_text(elapsed, live.eta_s.map(seconds), waited)
-    );
-    line("time", &text);
+    line("time", &time_text(live));
     let [one, two] = live.cameras.each_ref().map(|c| {
         c.events_per_s
             .map_or_else(|| "-".to_owned(), |r| format!("{:.1}", r / 1e3))

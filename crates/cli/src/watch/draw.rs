@@ -1,13 +1,12 @@
 //! Draws a frame as text for a terminal of any width.
 
 use skinrig_model::text::is_hidden;
-use skinrig_model::{HostDuration, PressRole};
 use skinrig_text::{Column, LongWords, Paint, Style, Table, WIDTH, clip, wrap};
 
 use super::failures::{CameraLoss, Failure};
 use super::frame::{Frame, LatestAttempt};
 use super::map::map;
-use crate::progress::{clock_text, eta_text};
+use crate::progress::{block_text, time_text};
 use crate::remote::{LiveTouch, RunSnapshot};
 use crate::rig::gates;
 
@@ -168,10 +167,7 @@ fn progress(frame: &Frame, canvas: Canvas) -> Vec<String> {
 fn of_run(live: &RunSnapshot, canvas: Canvas) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(p) = &live.press {
-        let block = match p.role {
-            PressRole::Sync => "sync".to_owned(),
-            PressRole::Calibrate | PressRole::Score => format!("repetition {}", p.repetition),
-        };
+        let block = block_text(p);
         let [x, y] = p.at_mm;
         let text = format!(
             "press {} of {} ({block}) at ({x:.1}, {y:.1}) mm; {} retaken",
@@ -179,15 +175,7 @@ fn of_run(live: &RunSnapshot, canvas: Canvas) -> Vec<String> {
         );
         lines.extend(canvas.line("now", None, &text));
     }
-    let seconds = HostDuration::from_secs_f64;
-    let elapsed = seconds(live.elapsed_s);
-    let waited = std::time::Duration::try_from_secs_f64(live.waited_s).unwrap_or_default();
-    let text = format!(
-        "{} of rig time in this leg; eta {}",
-        clock_text(elapsed),
-        eta_text(elapsed, live.eta_s.map(seconds), waited)
-    );
-    lines.extend(canvas.line("time", None, &text));
+    lines.extend(canvas.line("time", None, &time_text(live)));
     if let Some(touch) = &live.touch {
         lines.extend(canvas.line("felt", None, &felt(touch)));
     }
