@@ -8,14 +8,11 @@ use csv::{Writer, WriterBuilder};
 use crate::error::ExportError;
 use crate::folder::Folder;
 use crate::table::{Layout, TableWriter, Values};
+use crate::table_files::TableFiles;
 
 /// Writes one file per table.
 #[derive(Debug)]
-pub struct CsvFiles {
-    folder: Folder,
-    open: Option<(Writer<File>, String)>,
-    written: Vec<PathBuf>,
-}
+pub struct CsvFiles(TableFiles<Writer<File>>);
 
 /// Suffix of a table's file name.
 pub(crate) const SUFFIX: &str = "csv";
@@ -24,39 +21,32 @@ impl CsvFiles {
     /// Writes into `folder`.
     #[must_use]
     pub const fn new(folder: Folder) -> Self {
-        Self {
-            folder,
-            open: None,
-            written: Vec::new(),
-        }
+        Self(TableFiles::new(folder))
     }
 
     /// Paths of the files, in order.
     #[must_use]
-    pub fn into_paths(mut self) -> Vec<PathBuf> {
-        std::mem::take(&mut self.written)
+    pub fn into_paths(self) -> Vec<PathBuf> {
+        self.0.into_paths()
     }
 }
 
 impl TableWriter for CsvFiles {
     fn begin(&mut self, layout: &Layout, _rows: u64) -> Result<(), ExportError> {
         let suffix = format!(".{}.{SUFFIX}", layout.name);
-        let path = self.folder.begin(&suffix)?;
-        let file = File::create_new(&path).map_err(ExportError::file(&path))?;
-        let mut writer = WriterBuilder::new()
-            .buffer_capacity(1 << 16)
-            .from_writer(file);
-        let names = layout.columns.iter().map(|column| &column.name);
-        let headed = writer.write_record(names);
-        self.open = Some((writer, suffix));
-        headed.map_err(ExportError::file(&path))
+        self.0.begin(suffix, |file| {
+            let mut writer = WriterBuilder::new()
+                .buffer_capacity(1 << 16)
+                .from_writer(file);
+            writer.write_record(layout.columns.iter().map(|column| &column.name))?;
+            Ok::<_, csv::Error>(writer)
+        })
     }
 
     fn append(&mut self, batch: &[Values]) -> Result<(), ExportError> {
-        let Some((writer, suffix)) = &mut self.open else {
+        let Some((writer, path)) = self.0.current() else {
             return Ok(());
         };
-        let path = self.folder.file(suffix);
         let rows = batch.first().map_or(0, Values::rows);
         let mut cell = String::new();
         for row in 0..rows {
@@ -76,21 +66,7 @@ impl TableWriter for CsvFiles {
     }
 
     fn end(&mut self) -> Result<(), ExportError> {
-        if let Some((mut writer, suffix)) = self.open.take() {
-            let path = self.folder.file(&suffix);
-            writer.flush().map_err(ExportError::file(&path))?;
-            drop(writer);
-            self.written.push(self.folder.complete(&suffix)?);
-        }
-        Ok(())
-    }
-}
-
-impl Drop for CsvFiles {
-    fn drop(&mut self) {
-        if let Some((_, suffix)) = self.open.take() {
-            self.folder.abandon(&suffix);
-        }
+        self.0.end(|mut writer| writer.flush())
     }
 }
 

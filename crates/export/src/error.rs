@@ -68,6 +68,18 @@ pub enum ExportError {
 }
 
 impl ExportError {
+    /// [`ExportError::Changed`] unless `found` rows of `table` are as many as `expected`.
+    pub(crate) fn check_rows(table: &'static str, expected: u64, found: u64) -> Result<(), Self> {
+        if found == expected {
+            return Ok(());
+        }
+        Err(Self::Changed {
+            table,
+            expected,
+            found,
+        })
+    }
+
     /// Converts an error on `path`.
     pub(crate) fn file<E: ToString>(path: &Path) -> impl Fn(E) -> Self + '_ {
         move |e| Self::File {

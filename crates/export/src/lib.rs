@@ -24,6 +24,7 @@ mod rocrate;
 mod source;
 mod streams;
 pub mod table;
+mod table_files;
 mod tables;
 
 pub use bundle::{BundleReport, MANIFEST, SIGNATURE_ENDING, seal_bundle, verify_bundle};

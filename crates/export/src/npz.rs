@@ -156,12 +156,8 @@ impl TableWriter for NpzFile {
 
     fn end(&mut self) -> Result<(), ExportError> {
         match self.table.take() {
-            Some(table) if table.found != table.expected => Err(ExportError::Changed {
-                table: table.name,
-                expected: table.expected,
-                found: table.found,
-            }),
-            _ => Ok(()),
+            Some(table) => ExportError::check_rows(table.name, table.expected, table.found),
+            None => Ok(()),
         }
     }
 }

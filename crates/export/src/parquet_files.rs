@@ -15,13 +15,10 @@ use parquet::schema::parser::parse_message_type;
 use crate::error::ExportError;
 use crate::folder::Folder;
 use crate::table::{Kind, Layout, TableWriter, Values};
+use crate::table_files::TableFiles;
 
 /// Writes one file per table.
-pub struct ParquetFiles {
-    folder: Folder,
-    open: Option<(SerializedFileWriter<File>, String)>,
-    written: Vec<PathBuf>,
-}
+pub struct ParquetFiles(TableFiles<SerializedFileWriter<File>>);
 
 /// Suffix of a table's file name.
 pub(crate) const SUFFIX: &str = "parquet";
@@ -30,17 +27,13 @@ impl ParquetFiles {
     /// Writes into `folder`.
     #[must_use]
     pub const fn new(folder: Folder) -> Self {
-        Self {
-            folder,
-            open: None,
-            written: Vec::new(),
-        }
+        Self(TableFiles::new(folder))
     }
 
     /// Paths of the files, in order.
     #[must_use]
-    pub fn into_paths(mut self) -> Vec<PathBuf> {
-        std::mem::take(&mut self.written)
+    pub fn into_paths(self) -> Vec<PathBuf> {
+        self.0.into_paths()
     }
 }
 
@@ -67,50 +60,24 @@ fn schema(layout: &Layout) -> String {
 impl TableWriter for ParquetFiles {
     fn begin(&mut self, layout: &Layout, _rows: u64) -> Result<(), ExportError> {
         let suffix = format!(".{}.{SUFFIX}", layout.name);
-        let path = self.folder.begin(&suffix)?;
-        let file = File::create_new(&path).map_err(ExportError::file(&path))?;
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
             .build();
-        let writer = parse_message_type(&schema(layout)).and_then(|schema| {
+        self.0.begin(suffix, |file| {
+            let schema = parse_message_type(&schema(layout))?;
             SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties))
-        });
-        match writer {
-            Ok(writer) => self.open = Some((writer, suffix)),
-            Err(e) => {
-                self.folder.abandon(&suffix);
-                return Err(ExportError::file(&path)(e));
-            }
-        }
-        Ok(())
+        })
     }
 
     fn append(&mut self, batch: &[Values]) -> Result<(), ExportError> {
-        let Some((writer, suffix)) = &mut self.open else {
+        let Some((writer, path)) = self.0.current() else {
             return Ok(());
         };
-        let path = self.folder.file(suffix);
         row_group(writer, batch).map_err(ExportError::file(&path))
     }
 
     fn end(&mut self) -> Result<(), ExportError> {
-        if let Some((writer, suffix)) = self.open.take() {
-            let path = self.folder.file(&suffix);
-            if let Err(e) = writer.close() {
-                self.folder.abandon(&suffix);
-                return Err(ExportError::file(&path)(e));
-            }
-            self.written.push(self.folder.complete(&suffix)?);
-        }
-        Ok(())
-    }
-}
-
-impl Drop for ParquetFiles {
-    fn drop(&mut self) {
-        if let Some((_, suffix)) = self.open.take() {
-            self.folder.abandon(&suffix);
-        }
+        self.0.end(|writer| writer.close().map(drop))
     }
 }
 

@@ -102,13 +102,7 @@ pub(crate) fn events(
         Ok(())
     })?;
     to.append(&batch.take())?;
-    if found != expected {
-        return Err(ExportError::Changed {
-            table: name,
-            expected,
-            found,
-        });
-    }
+    ExportError::check_rows(name, expected, found)?;
     to.end()
 }
 
@@ -143,13 +137,7 @@ pub(crate) fn pose(source: &Source<'_>, to: &mut dyn TableWriter) -> Result<(), 
         return Err(fault);
     }
     to.append(&pose_batch(&samples))?;
-    if found != expected {
-        return Err(ExportError::Changed {
-            table: name,
-            expected,
-            found,
-        });
-    }
+    ExportError::check_rows(name, expected, found)?;
     to.end()
 }
 
