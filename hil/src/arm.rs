@@ -4,7 +4,7 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use skinrig_controller::{
-    ControlHandle, ControllerSettings, Jog, MoveOutcome, RunFault, TouchOutcome,
+    ControlHandle, ControllerSettings, Jog, JogSetup, MoveOutcome, RunFault, TouchOutcome,
 };
 use skinrig_device::{Clock, DeviceError, Indenter, MotionLimits, RobotSample};
 use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, Robot, Setting, Skin};
@@ -130,10 +130,7 @@ fn with_robot(
 /// How a check arms the robot.
 struct ArmSetup<'a> {
     volume: &'a TestVolume,
-    run: RunLimits,
-    robot_limits: MotionLimits,
-    control: ControlHandle,
-    settings: ControllerSettings,
+    jog: JogSetup,
 }
 
 /// Touch search and stop signal of a check.
@@ -150,15 +147,17 @@ impl<'a> ArmSetup<'a> {
         robot: &dyn Indenter,
         control: ControlHandle,
     ) -> Self {
-        let (run, robot_limits) =
+        let (limits, robot_limits) =
             limits(volume, reach, robot.capabilities().max_acceleration_mm_s2);
-        Self {
-            volume,
-            run,
+        let jog = JogSetup {
+            robot_from_skin: volume.robot_from_skin,
+            limits,
             robot_limits,
+            floor: None,
             control,
             settings: settings(timing_slack),
-        }
+        };
+        Self { volume, jog }
     }
 
     fn start<'r>(
@@ -166,16 +165,7 @@ impl<'a> ArmSetup<'a> {
         robot: &'r mut dyn Indenter,
         clock: &'r mut dyn Clock,
     ) -> Result<Jog<'r>, Problem> {
-        let started = Jog::on_skin(
-            Box::new(robot),
-            Box::new(clock),
-            self.volume.robot_from_skin,
-            self.run,
-            &self.robot_limits,
-            &self.control,
-            self.settings,
-        );
-        started.map(|(jog, _)| jog).map_err(from_controller)
+        Jog::start(Box::new(robot), Box::new(clock), &self.jog).map_err(from_controller)
     }
 
     /// Rises to clearance height if the tip is below it.
@@ -184,7 +174,7 @@ impl<'a> ArmSetup<'a> {
         if at.z_mm >= CLEARANCE_MM {
             return Ok(());
         }
-        let speed = SLOW_MM_S.min(self.run.max_speed_mm_s);
+        let speed = SLOW_MM_S.min(self.jog.limits.max_speed_mm_s);
         let up = at.plane().at_height(CLEARANCE_MM + 2.0 * TOLERANCE_MM);
         jog.go(up, speed, &|| false)
             .map(drop)
@@ -211,7 +201,7 @@ fn arm_and_work(
         stop: context.stop,
         volume: setup.volume,
         search: context.search,
-        robot_limits: setup.robot_limits,
+        robot_limits: setup.jog.robot_limits,
     };
     let result = work(&mut arm, findings);
     let ended = arm.jog.finish();

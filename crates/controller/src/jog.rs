@@ -5,13 +5,12 @@ mod watch;
 use skinrig_device::{Clock, Indenter, MotionLimits};
 use skinrig_model::{
     DeviceIdentity, GuardError, HostDuration, HostTime, NotArrived, Point3, PoseSample,
-    RigidTransform, Robot, RunFault, Setting, Skin,
+    RigidTransform, Robot, RunFault, Skin,
 };
 use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::RunLimits;
 
 use crate::control::ControlHandle;
-
 use crate::guard::{Floor, GuardedIndenter};
 use crate::press_tracker::Settling;
 use crate::settings::ControllerSettings;
@@ -26,6 +25,24 @@ const RETRACT_MM: f64 = 10.0;
 
 /// Returns true once the operator has requested a stop.
 pub(crate) type StopCheck<'a> = &'a dyn Fn() -> bool;
+
+/// Frame and limits of manual motion.
+#[derive(Debug, Clone)]
+pub struct JogSetup {
+    /// Pose of the frame of all coordinates. The identity, so the robot frame, while the pose of the skin is still to be
+    /// found by touching off.
+    pub robot_from_skin: RigidTransform<Robot, Skin>,
+    /// Limits in that frame. Below their clearance height the tip moves only vertically, and no deeper than they allow.
+    pub limits: RunLimits,
+    /// Limits that the robot itself enforces, robot frame.
+    pub robot_limits: MotionLimits,
+    /// Nothing goes below it.
+    pub floor: Option<Floor>,
+    /// Only a halt is handled: it disarms immediately and ends the current call with [`RunFault::Halted`].
+    pub control: ControlHandle,
+    /// Timing of the controller.
+    pub settings: ControllerSettings,
+}
 
 /// A manually moved robot. Dropping it holds, retracts and disarms.
 pub struct Jog<'a> {
@@ -64,55 +81,19 @@ pub enum TouchOutcome {
 }
 
 impl<'a> Jog<'a> {
-    /// Configures the robot's limits, powers it, and waits for its pose. All coordinates, including those of `limits`, are in the
-    /// robot frame, since the pose of the skin is still to be found by touching off. Nothing goes below the `floor`. Of `control`, only a
-    /// halt is handled: it disarms immediately and ends the current call with [`RunFault::Halted`].
+    /// Configures the robot's limits, powers it, and waits for its pose.
     ///
     /// # Errors
     /// The error of the robot; [`RunFault::PoseStream`] if it reports no pose. The robot is then disarmed.
     pub fn start(
         indenter: Box<dyn Indenter + 'a>,
         clock: Box<dyn Clock + 'a>,
-        limits: RunLimits,
-        robot_limits: &MotionLimits,
-        floor: Option<Floor>,
-        control: &ControlHandle,
-        settings: ControllerSettings,
-    ) -> Result<(Self, Vec<Setting>), RunFault> {
-        let indenter =
-            GuardedIndenter::new(indenter, RigidTransform::identity(), limits, &settings)
-                .with_floor(floor);
-        Self::begin(indenter, clock, limits, robot_limits, control, settings)
-    }
-
-    /// Like [`start`](Self::start), in the frame of a skin with known pose: below the clearance height of `limits` the tip
-    /// moves only vertically, and no deeper than they allow.
-    ///
-    /// # Errors
-    /// As [`start`](Self::start).
-    pub fn on_skin(
-        indenter: Box<dyn Indenter + 'a>,
-        clock: Box<dyn Clock + 'a>,
-        robot_from_skin: RigidTransform<Robot, Skin>,
-        limits: RunLimits,
-        robot_limits: &MotionLimits,
-        control: &ControlHandle,
-        settings: ControllerSettings,
-    ) -> Result<(Self, Vec<Setting>), RunFault> {
-        let indenter = GuardedIndenter::new(indenter, robot_from_skin, limits, &settings);
-        Self::begin(indenter, clock, limits, robot_limits, control, settings)
-    }
-
-    fn begin(
-        indenter: GuardedIndenter<'a>,
-        clock: Box<dyn Clock + 'a>,
-        limits: RunLimits,
-        robot_limits: &MotionLimits,
-        control: &ControlHandle,
-        settings: ControllerSettings,
-    ) -> Result<(Self, Vec<Setting>), RunFault> {
+        setup: &JogSetup,
+    ) -> Result<Self, RunFault> {
+        let (limits, settings) = (setup.limits, setup.settings);
         let mut jog = Self {
-            indenter,
+            indenter: GuardedIndenter::new(indenter, setup.robot_from_skin, limits, &settings)
+                .with_floor(setup.floor),
             clock,
             settings,
             limits,
@@ -121,9 +102,9 @@ impl<'a> Jog<'a> {
             trace: Vec::new(),
             traced: None,
             finished: false,
-            control: control.clone(),
+            control: setup.control.clone(),
         };
-        let written = jog.indenter.configure(robot_limits)?;
+        jog.indenter.configure(&setup.robot_limits)?;
         jog.indenter.arm()?;
         let until = jog.clock.now() + jog.settings.first_pose_within;
         while jog.indenter.position().is_none() {
@@ -135,7 +116,7 @@ impl<'a> Jog<'a> {
             }
             jog.tick()?;
         }
-        Ok((jog, written))
+        Ok(jog)
     }
 
     /// Identity of the robot.

@@ -52,7 +52,7 @@ pub use checks::{
 pub use control::{ControlHandle, NoteQueueFull};
 pub use error::Problem;
 pub use guard::{Floor, GuardedIndenter};
-pub use jog::{Jog, MoveOutcome, TouchOutcome};
+pub use jog::{Jog, JogSetup, MoveOutcome, TouchOutcome};
 pub use looks::{LookFault, LookOutcome, Looks};
 pub use progress::{Progress, ProgressTracker};
 pub use run::{Resume, Run, RunReport};

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use chrono::Utc;
 use skinrig_controller::{
-    ControlHandle, ControllerSettings, Floor, Jog, MoveOutcome, RunFault, TouchOutcome,
+    ControlHandle, ControllerSettings, Floor, Jog, JogSetup, MoveOutcome, RunFault, TouchOutcome,
 };
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
 use skinrig_hil::lease::Lease;
@@ -174,25 +174,24 @@ pub(crate) fn jog(args: &JogArgs) -> Outcome {
 
     // Opened after the ctrl-C handler is set: from here on the arm may be live.
     let (bench, _lease) = open(args)?;
-    let (run, robot) = limits(&bench);
+    let (run, robot_limits) = limits(&bench);
     let skin_from_robot = bench.robot_from_skin.inverse();
     let floor = Floor {
         skin_from_robot,
         max_depth_mm: bench.max_depth_mm,
     };
-    let (jog, _) = Jog::start(
-        bench.indenter,
-        bench.clock,
-        run,
-        &robot,
-        (!args.beyond_frame).then_some(floor),
-        &control,
-        ControllerSettings {
+    let setup = JogSetup {
+        robot_from_skin: RigidTransform::identity(),
+        limits: run,
+        robot_limits,
+        floor: (!args.beyond_frame).then_some(floor),
+        control,
+        settings: ControllerSettings {
             stale_after: bench::SLOW_STALE,
             ..ControllerSettings::default()
         },
-    )
-    .map_err(Failure::rig)?;
+    };
+    let jog = Jog::start(bench.indenter, bench.clock, &setup).map_err(Failure::rig)?;
     let mut console = Console {
         jog,
         stop,

@@ -1,8 +1,10 @@
 //! Manual motion on the simulated rig: the floor of the frame, and the operator's halt.
 
-use skinrig_controller::{ControlHandle, ControllerSettings, Floor, GuardError, Jog, RunFault};
+use skinrig_controller::{
+    ControlHandle, ControllerSettings, Floor, GuardError, Jog, JogSetup, RunFault,
+};
 use skinrig_device::MotionLimits;
-use skinrig_model::{HostDuration, Point3, SimLevel, Skin};
+use skinrig_model::{HostDuration, Point3, RigidTransform, SimLevel, Skin};
 use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::{RunLimits, TripReaction};
 use skinrig_sim::config::SimConfig;
@@ -27,7 +29,7 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
         max_acceleration_mm_s2: None,
         on_trip: TripReaction::Retract,
     };
-    let robot = MotionLimits {
+    let robot_limits = MotionLimits {
         min_mm,
         max_mm,
         max_speed_mm_s: can.max_speed_mm_s,
@@ -38,17 +40,16 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
         skin_from_robot: rig.robot_from_skin.inverse(),
         max_depth_mm,
     });
-    let started = Jog::start(
-        rig.indenter,
-        rig.clock,
+    let setup = JogSetup {
+        robot_from_skin: RigidTransform::identity(),
         limits,
-        &robot,
+        robot_limits,
         floor,
-        control,
-        ControllerSettings::default(),
-    );
-    match started {
-        Ok((jog, _)) => jog,
+        control: control.clone(),
+        settings: ControllerSettings::default(),
+    };
+    match Jog::start(rig.indenter, rig.clock, &setup) {
+        Ok(jog) => jog,
         Err(e) => panic!("{e}"),
     }
 }
