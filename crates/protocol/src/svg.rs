@@ -2,193 +2,18 @@
 
 use std::fmt::Write;
 
-use skinrig_model::{Point2, PressRole, RepetitionId};
+use skinrig_model::{PlannedPress, Point2, PressRole, RepetitionId};
 
-use crate::area::{Area, Surroundings};
+use crate::area::{Area, KeepOut, Surroundings};
 use crate::plan::Plan;
 use crate::summary::counted;
 
 /// Millimetres around the skin for axes and legend.
 const BORDER_MM: f64 = 14.0;
+/// Height of the legend, mm.
+const LEGEND_MM: f64 = 22.0;
 /// Up to this many locations, each is numbered; beyond it, line ends and every tenth.
 const NUMBER_ALL: usize = 120;
-
-/// The path of `plan` as an SVG, seen from above: x to the right, y up, 6 px per mm, light and dark by the viewer's
-/// preference. Locations are numbered from 1 in the order in which the first repetition visits them.
-#[must_use]
-pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
-    let outline = around.outline;
-    let corners = outline.polygon(24);
-    let (mut low, mut high) = (outline.centre, outline.centre);
-    let mut include = |p: Point2| {
-        low = Point2::new(low.x_mm.min(p.x_mm), low.y_mm.min(p.y_mm));
-        high = Point2::new(high.x_mm.max(p.x_mm), high.y_mm.max(p.y_mm));
-    };
-    corners.iter().for_each(|p| include(*p));
-    plan.presses.iter().for_each(|p| include(p.at));
-    for keep_out in &around.keep_outs {
-        match &keep_out.area {
-            Area::Circle { centre, radius_mm } => {
-                include(Point2::new(
-                    centre.x_mm - radius_mm,
-                    centre.y_mm - radius_mm,
-                ));
-                include(Point2::new(
-                    centre.x_mm + radius_mm,
-                    centre.y_mm + radius_mm,
-                ));
-            }
-            Area::Polygon(points) => points.iter().for_each(|p| include(*p)),
-        }
-    }
-    let (width, height) = (high.x_mm - low.x_mm, high.y_mm - low.y_mm);
-    let legend = 22.0;
-    let full = [width + 2.0 * BORDER_MM, height + 2.0 * BORDER_MM + legend];
-    let mut svg = String::new();
-    let mut write = |text: String| {
-        svg.push_str(&text);
-        svg.push('\n');
-    };
-    // Picture coordinates: mm, y down.
-    let at = |p: Point2| {
-        (
-            p.x_mm - low.x_mm + BORDER_MM,
-            high.y_mm - p.y_mm + BORDER_MM,
-        )
-    };
-    write(format!(
-        r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {:.1} {:.1}" width="{:.0}" height="{:.0}" role="img" aria-label="press path of {}">"#,
-        full[0],
-        full[1],
-        full[0] * 6.0,
-        full[1] * 6.0,
-        escape(&plan.name)
-    ));
-    write(STYLE.to_owned());
-    write(r#"<rect class="paper" width="100%" height="100%"/>"#.to_owned());
-    write(format!(
-        r#"<polygon class="skin" points="{}"/>"#,
-        points(&corners, &at)
-    ));
-    grid(&mut write, low, high, &at);
-    for keep_out in &around.keep_outs {
-        let title = escape(&keep_out.name);
-        match &keep_out.area {
-            Area::Circle { centre, radius_mm } => {
-                let (x, y) = at(*centre);
-                if keep_out.margin_mm > 0.0 {
-                    write(format!(
-                        r#"<circle class="margin" cx="{x:.2}" cy="{y:.2}" r="{:.2}"/>"#,
-                        radius_mm + keep_out.margin_mm
-                    ));
-                }
-                write(format!(
-                    r#"<circle class="keepout" cx="{x:.2}" cy="{y:.2}" r="{radius_mm:.2}"><title>{title}</title></circle>"#
-                ));
-            }
-            Area::Polygon(corners) => {
-                if keep_out.margin_mm > 0.0 {
-                    write(format!(
-                        r#"<polygon class="margin" style="stroke-width:{:.2}" points="{}"/>"#,
-                        2.0 * keep_out.margin_mm,
-                        points(corners, &at)
-                    ));
-                }
-                write(format!(
-                    r#"<polygon class="keepout" points="{}"><title>{title}</title></polygon>"#,
-                    points(corners, &at)
-                ));
-            }
-        }
-    }
-    let visits = first_visits(plan);
-    if visits.len() > 1 {
-        write(format!(
-            r#"<polyline class="path" points="{}"/>"#,
-            points(&visits, &at)
-        ));
-    }
-    let nearest = closest_pair_mm(&visits).clamp(0.5, 8.0);
-    let radius = (nearest * 0.18).clamp(0.3, 1.1);
-    let text = (nearest * 0.38).clamp(0.8, 2.2);
-    for (number, p) in (1..).zip(&visits) {
-        let (x, y) = at(*p);
-        let class = match number {
-            1 => "press first",
-            n if n == visits.len() => "press last",
-            _ => "press",
-        };
-        write(format!(
-            r#"<circle class="{class}" cx="{x:.2}" cy="{y:.2}" r="{radius:.2}"><title>{number}: ({:.2}, {:.2}) mm</title></circle>"#,
-            p.x_mm, p.y_mm
-        ));
-        let ends_line = turns(&visits, number - 1);
-        if visits.len() <= NUMBER_ALL
-            || number == 1
-            || number == visits.len()
-            || ends_line
-            || number % 10 == 0
-        {
-            write(format!(
-                r#"<text class="number" font-size="{text:.2}" x="{:.2}" y="{:.2}">{number}</text>"#,
-                x + radius * 0.9,
-                y - radius * 0.9
-            ));
-        }
-    }
-    let sync = plan.presses.iter().filter(|p| p.role == PressRole::Sync);
-    if let Some(press) = sync.clone().next() {
-        let (x, y) = at(press.at);
-        let s = radius * 2.2;
-        write(format!(
-            r#"<path class="sync" d="M{:.2} {y:.2}h{:.2}M{x:.2} {:.2}v{:.2}"/>"#,
-            x - s,
-            2.0 * s,
-            y - s,
-            2.0 * s
-        ));
-    }
-    let mut y = BORDER_MM + height + 11.0;
-    let mut line = |mark: &str, text: &str| {
-        let mark = mark.replace("{y}", &format!("{:.2}", y - 0.9));
-        write(format!(
-            r#"{mark}<text class="legend" x="{:.1}" y="{y:.2}">{}</text>"#,
-            BORDER_MM + 6.0,
-            escape(text)
-        ));
-        y += 4.2;
-    };
-    let x = BORDER_MM + 2.0;
-    line(
-        "",
-        &format!("{}: {}", plan.name, legend_text(plan, visits.len())),
-    );
-    line(
-        &format!(
-            r#"<circle class="press first" cx="{:.1}" cy="{{y}}" r="1"/><circle class="press last" cx="{:.1}" cy="{{y}}" r="1"/>"#,
-            x - 1.2,
-            x + 1.6
-        ),
-        "first and last press; numbers: order of the first repetition",
-    );
-    if sync.clone().next().is_some() {
-        line(
-            &format!(
-                r#"<path class="sync" d="M{:.1} {{y}}h3.2M{x:.1} {{y}}m0 -1.6v3.2"/>"#,
-                x - 1.6
-            ),
-            &format!("{} sync presses", sync.count()),
-        );
-    }
-    if !around.keep_outs.is_empty() {
-        line(
-            &format!(r#"<circle class="keepout" cx="{x:.1}" cy="{{y}}" r="1.2"/>"#),
-            "keep-out areas with their margins",
-        );
-    }
-    write("</svg>".to_owned());
-    svg
-}
 
 /// Colours by role; the dark set follows the viewer's preference.
 const STYLE: &str = "<style>\n\
@@ -202,65 +27,278 @@ const STYLE: &str = "<style>\n\
 .sync{stroke:#b794ff}.keepout{stroke:#ff8577}}\n\
 </style>";
 
-fn grid(
-    write: &mut impl FnMut(String),
-    low: Point2,
-    high: Point2,
-    at: &impl Fn(Point2) -> (f64, f64),
-) {
-    let step = 10.0;
-    let lines = |from: f64, to: f64| {
-        let first = (from / step).ceil() as i64;
-        let last = (to / step).floor() as i64;
-        first..=last
-    };
-    for k in lines(low.x_mm, high.x_mm) {
-        let v = k as f64 * step;
-        let (x, top) = at(Point2::new(v, high.y_mm));
-        let (_, bottom) = at(Point2::new(v, low.y_mm));
-        write(format!(
-            r#"<line class="grid" x1="{x:.2}" y1="{top:.2}" x2="{x:.2}" y2="{bottom:.2}"/>"#
-        ));
-        write(format!(
-            r#"<text class="axis" text-anchor="middle" x="{x:.2}" y="{:.2}">{v:.0}</text>"#,
-            bottom + 4.0
-        ));
+/// The path of `plan` as an SVG, seen from above: x to the right, y up, 6 px per mm, light and dark by the viewer's
+/// preference. Locations are numbered from 1 in the order in which the first repetition visits them.
+#[must_use]
+pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
+    let corners = around.outline.polygon(24);
+    let mut picture = Picture::around(plan, around, &corners);
+    picture.open(&plan.name);
+    let outline = picture.points(&corners);
+    picture.write(&format!(r#"<polygon class="skin" points="{outline}"/>"#));
+    picture.grid();
+    for keep_out in &around.keep_outs {
+        picture.keep_out(keep_out);
     }
-    for k in lines(low.y_mm, high.y_mm) {
-        let v = k as f64 * step;
-        let (left, y) = at(Point2::new(low.x_mm, v));
-        let (right, _) = at(Point2::new(high.x_mm, v));
-        write(format!(
-            r#"<line class="grid" x1="{left:.2}" y1="{y:.2}" x2="{right:.2}" y2="{y:.2}"/>"#
-        ));
-        write(format!(
-            r#"<text class="axis" text-anchor="end" x="{:.2}" y="{:.2}">{v:.0}</text>"#,
-            left - 1.5,
-            y + 0.9
-        ));
+    let visits = first_visits(plan);
+    let nearest = closest_pair_mm(&visits).clamp(0.5, 8.0);
+    let radius = (nearest * 0.18).clamp(0.3, 1.1);
+    let text_size = (nearest * 0.38).clamp(0.8, 2.2);
+    picture.visits(&visits, radius, text_size);
+    let mut sync = plan.presses.iter().filter(|p| p.role == PressRole::Sync);
+    if let Some(press) = sync.next() {
+        picture.sync_cross(press.at, radius * 2.2);
     }
-    let (right, bottom) = at(Point2::new(high.x_mm, low.y_mm));
-    write(format!(
-        r#"<text class="axis" text-anchor="end" x="{:.2}" y="{:.2}">x, mm</text>"#,
-        right + 12.0,
-        bottom + 4.0
-    ));
-    let (left, top) = at(Point2::new(low.x_mm, high.y_mm));
-    write(format!(
-        r#"<text class="axis" x="{:.2}" y="{:.2}">y, mm</text>"#,
-        left - 9.0,
-        top - 4.0
-    ));
+    picture.legend(plan, around, visits.len());
+    picture.write("</svg>");
+    picture.svg
 }
 
-fn points(list: &[Point2], at: &impl Fn(Point2) -> (f64, f64)) -> String {
-    let mut text = String::new();
-    for p in list {
-        let (x, y) = at(*p);
-        let _ = write!(text, "{x:.2},{y:.2} ");
+/// A picture in mm, y down; `low` and `high` are the corners of its content in the skin frame.
+struct Picture {
+    svg: String,
+    low: Point2,
+    high: Point2,
+}
+
+impl Picture {
+    /// An empty picture with room for outline, presses and keep-outs.
+    fn around(plan: &Plan, around: &Surroundings, corners: &[Point2]) -> Self {
+        let centre = around.outline.centre;
+        let mut picture = Self {
+            svg: String::new(),
+            low: centre,
+            high: centre,
+        };
+        corners.iter().for_each(|p| picture.include(*p));
+        plan.presses.iter().for_each(|p| picture.include(p.at));
+        for keep_out in &around.keep_outs {
+            match &keep_out.area {
+                Area::Circle { centre, radius_mm } => {
+                    let (x_mm, y_mm) = (centre.x_mm, centre.y_mm);
+                    picture.include(Point2::new(x_mm - radius_mm, y_mm - radius_mm));
+                    picture.include(Point2::new(x_mm + radius_mm, y_mm + radius_mm));
+                }
+                Area::Polygon(points) => points.iter().for_each(|p| picture.include(*p)),
+            }
+        }
+        picture
     }
-    text.truncate(text.trim_end().len());
-    text
+
+    const fn include(&mut self, p: Point2) {
+        let (low, high) = (self.low, self.high);
+        self.low = Point2::new(low.x_mm.min(p.x_mm), low.y_mm.min(p.y_mm));
+        self.high = Point2::new(high.x_mm.max(p.x_mm), high.y_mm.max(p.y_mm));
+    }
+
+    /// Adds a line of text.
+    fn write(&mut self, line: &str) {
+        self.svg.push_str(line);
+        self.svg.push('\n');
+    }
+
+    fn height_mm(&self) -> f64 {
+        self.high.y_mm - self.low.y_mm
+    }
+
+    /// Picture coordinates of a position.
+    fn at(&self, p: Point2) -> (f64, f64) {
+        (
+            p.x_mm - self.low.x_mm + BORDER_MM,
+            self.high.y_mm - p.y_mm + BORDER_MM,
+        )
+    }
+
+    /// Value of a `points` attribute.
+    fn points(&self, list: &[Point2]) -> String {
+        let mut text = String::new();
+        for p in list {
+            let (x, y) = self.at(*p);
+            let _ = write!(text, "{x:.2},{y:.2} ");
+        }
+        text.truncate(text.trim_end().len());
+        text
+    }
+
+    fn open(&mut self, name: &str) {
+        let width = self.high.x_mm - self.low.x_mm + 2.0 * BORDER_MM;
+        let height = self.height_mm() + 2.0 * BORDER_MM + LEGEND_MM;
+        self.write(&format!(
+            r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.1} {height:.1}" width="{:.0}" height="{:.0}" role="img" aria-label="press path of {}">"#,
+            width * 6.0,
+            height * 6.0,
+            escape(name)
+        ));
+        self.write(STYLE);
+        self.write(r#"<rect class="paper" width="100%" height="100%"/>"#);
+    }
+
+    /// A keep-out area and its margin.
+    fn keep_out(&mut self, keep_out: &KeepOut) {
+        let title = escape(&keep_out.name);
+        let margin_mm = keep_out.margin_mm;
+        match &keep_out.area {
+            Area::Circle { centre, radius_mm } => {
+                let (x, y) = self.at(*centre);
+                if margin_mm > 0.0 {
+                    self.write(&format!(
+                        r#"<circle class="margin" cx="{x:.2}" cy="{y:.2}" r="{:.2}"/>"#,
+                        radius_mm + margin_mm
+                    ));
+                }
+                self.write(&format!(
+                    r#"<circle class="keepout" cx="{x:.2}" cy="{y:.2}" r="{radius_mm:.2}"><title>{title}</title></circle>"#
+                ));
+            }
+            Area::Polygon(corners) => {
+                let points = self.points(corners);
+                if margin_mm > 0.0 {
+                    self.write(&format!(
+                        r#"<polygon class="margin" style="stroke-width:{:.2}" points="{points}"/>"#,
+                        2.0 * margin_mm
+                    ));
+                }
+                self.write(&format!(
+                    r#"<polygon class="keepout" points="{points}"><title>{title}</title></polygon>"#
+                ));
+            }
+        }
+    }
+
+    /// The path, and its locations as numbered dots.
+    fn visits(&mut self, visits: &[Point2], radius: f64, text_size: f64) {
+        if visits.len() > 1 {
+            let points = self.points(visits);
+            self.write(&format!(r#"<polyline class="path" points="{points}"/>"#));
+        }
+        for (number, p) in (1..).zip(visits) {
+            let (x, y) = self.at(*p);
+            let class = match number {
+                1 => "press first",
+                n if n == visits.len() => "press last",
+                _ => "press",
+            };
+            self.write(&format!(
+                r#"<circle class="{class}" cx="{x:.2}" cy="{y:.2}" r="{radius:.2}"><title>{number}: ({:.2}, {:.2}) mm</title></circle>"#,
+                p.x_mm, p.y_mm
+            ));
+            let is_numbered = visits.len() <= NUMBER_ALL
+                || number == 1
+                || number == visits.len()
+                || number % 10 == 0
+                || turns(visits, number - 1);
+            if is_numbered {
+                self.write(&format!(
+                    r#"<text class="number" font-size="{text_size:.2}" x="{:.2}" y="{:.2}">{number}</text>"#,
+                    x + radius * 0.9,
+                    y - radius * 0.9
+                ));
+            }
+        }
+    }
+
+    fn sync_cross(&mut self, centre: Point2, half: f64) {
+        let (x, y) = self.at(centre);
+        self.write(&format!(
+            r#"<path class="sync" d="M{:.2} {y:.2}h{:.2}M{x:.2} {:.2}v{:.2}"/>"#,
+            x - half,
+            2.0 * half,
+            y - half,
+            2.0 * half
+        ));
+    }
+
+    /// Explains the marks below the picture.
+    fn legend(&mut self, plan: &Plan, around: &Surroundings, locations: usize) {
+        let x = BORDER_MM + 2.0;
+        let mut lines = vec![
+            (
+                String::new(),
+                format!("{}: {}", plan.name, legend_text(plan, locations)),
+            ),
+            (
+                format!(
+                    r#"<circle class="press first" cx="{:.1}" cy="{{y}}" r="1"/><circle class="press last" cx="{:.1}" cy="{{y}}" r="1"/>"#,
+                    x - 1.2,
+                    x + 1.6
+                ),
+                "first and last press; numbers: order of the first repetition".to_owned(),
+            ),
+        ];
+        let is_sync = |p: &&PlannedPress| p.role == PressRole::Sync;
+        let sync = plan.presses.iter().filter(is_sync).count();
+        if sync > 0 {
+            let cross = format!(
+                r#"<path class="sync" d="M{:.1} {{y}}h3.2M{x:.1} {{y}}m0 -1.6v3.2"/>"#,
+                x - 1.6
+            );
+            lines.push((cross, format!("{sync} sync presses")));
+        }
+        if !around.keep_outs.is_empty() {
+            lines.push((
+                format!(r#"<circle class="keepout" cx="{x:.1}" cy="{{y}}" r="1.2"/>"#),
+                "keep-out areas with their margins".to_owned(),
+            ));
+        }
+        let mut y = BORDER_MM + self.height_mm() + 11.0;
+        for (mark, text) in lines {
+            let mark = mark.replace("{y}", &format!("{:.2}", y - 0.9));
+            self.write(&format!(
+                r#"{mark}<text class="legend" x="{:.1}" y="{y:.2}">{}</text>"#,
+                BORDER_MM + 6.0,
+                escape(&text)
+            ));
+            y += 4.2;
+        }
+    }
+
+    /// Lines every 10 mm, with the axes.
+    fn grid(&mut self) {
+        let (low, high) = (self.low, self.high);
+        let step = 10.0;
+        let lines = |from: f64, to: f64| {
+            let first = (from / step).ceil() as i64;
+            let last = (to / step).floor() as i64;
+            first..=last
+        };
+        for k in lines(low.x_mm, high.x_mm) {
+            let v = k as f64 * step;
+            let (x, top) = self.at(Point2::new(v, high.y_mm));
+            let (_, bottom) = self.at(Point2::new(v, low.y_mm));
+            self.write(&format!(
+                r#"<line class="grid" x1="{x:.2}" y1="{top:.2}" x2="{x:.2}" y2="{bottom:.2}"/>"#
+            ));
+            self.write(&format!(
+                r#"<text class="axis" text-anchor="middle" x="{x:.2}" y="{:.2}">{v:.0}</text>"#,
+                bottom + 4.0
+            ));
+        }
+        for k in lines(low.y_mm, high.y_mm) {
+            let v = k as f64 * step;
+            let (left, y) = self.at(Point2::new(low.x_mm, v));
+            let (right, _) = self.at(Point2::new(high.x_mm, v));
+            self.write(&format!(
+                r#"<line class="grid" x1="{left:.2}" y1="{y:.2}" x2="{right:.2}" y2="{y:.2}"/>"#
+            ));
+            self.write(&format!(
+                r#"<text class="axis" text-anchor="end" x="{:.2}" y="{:.2}">{v:.0}</text>"#,
+                left - 1.5,
+                y + 0.9
+            ));
+        }
+        let (right, bottom) = self.at(Point2::new(high.x_mm, low.y_mm));
+        self.write(&format!(
+            r#"<text class="axis" text-anchor="end" x="{:.2}" y="{:.2}">x, mm</text>"#,
+            right + 12.0,
+            bottom + 4.0
+        ));
+        let (left, top) = self.at(Point2::new(low.x_mm, high.y_mm));
+        self.write(&format!(
+            r#"<text class="axis" x="{:.2}" y="{:.2}">y, mm</text>"#,
+            left - 9.0,
+            top - 4.0
+        ));
+    }
 }
 
 /// Locations of the first repetition at its first depth, in order; repeated ones once.
