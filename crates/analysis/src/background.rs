@@ -2,7 +2,7 @@
 
 use skinrig_model::{AnalysisSettings, CameraId, SENSOR_WIDTH};
 
-/// What a camera saw in the idle time before a window.
+/// Events of a camera in the idle time before a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Background {
     /// Events of the crop.

@@ -14,9 +14,9 @@ use crate::tie::UntimedPress;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Exclusion {
-    /// The journal says that it was missed.
+    /// Missed according to the journal.
     Missed(MissedReason),
-    /// The journal says that it is invalid.
+    /// Invalid according to the journal.
     Invalid(InvalidReason),
     /// The journal excludes it.
     Excluded(ExcludedReason),
@@ -88,7 +88,7 @@ pub enum Exclusion {
 }
 
 impl Exclusion {
-    /// What the journal says; `None` for a valid attempt.
+    /// Exclusion by the journal; `None` for a valid attempt.
     #[must_use]
     pub fn of_journal(verdict: PressVerdict) -> Option<Self> {
         match verdict {

@@ -26,7 +26,7 @@ struct Span {
     idle: Option<u32>,
 }
 
-/// What a pixel did.
+/// Events of a pixel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pixel {
     idle_events: u32,

@@ -145,7 +145,7 @@ fn located(
     }
 }
 
-/// Why somebody left the press out; `None` if nobody did.
+/// Exclusion of the press by a person, if any.
 fn left_out(settings: &AnalysisSettings, press: PressId) -> Option<Exclusion> {
     let selected = settings.selected_out(press).cloned();
     let by_hand = || settings.excludes(press).then_some(Exclusion::ByHand);

@@ -10,7 +10,7 @@ use skinrig_model::{
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rule {
-    /// The journal says so.
+    /// Verdict of the journal.
     Journal(JournalRule),
     /// The journal holds no measured times.
     NoTimes,
@@ -44,7 +44,7 @@ pub enum Rule {
     BySelection(SelectionReason),
 }
 
-/// What the journal says of a press.
+/// Entry of the journal for a press.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JournalRule {
@@ -117,7 +117,7 @@ impl Rule {
         }
     }
 
-    /// True for a press that somebody left out, whatever its data.
+    /// True for a press that a person excluded, whatever its data.
     #[must_use]
     pub const fn is_by_hand(&self) -> bool {
         matches!(self, Self::ByHand | Self::BySelection(_))

@@ -33,7 +33,7 @@ impl<'a> AnalysisRequest<'a> {
         }
     }
 
-    /// The choices that the stages of an analysis know.
+    /// The options of the stages of an analysis.
     pub(crate) fn of_session(&self) -> skinrig_results::AnalysisOptions<'a> {
         skinrig_results::AnalysisOptions {
             overrides: self.overrides,

@@ -14,10 +14,10 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
 use crate::results;
 
-/// What became of a session.
+/// Outcome for a session.
 enum Added {
     Now,
-    /// It was there, but this file was missing or damaged.
+    /// Added again, because this file was missing or damaged.
     Again(PathBuf),
     IsThere,
     /// Not added, and why.

@@ -99,7 +99,7 @@ pub(crate) fn for_run(
     }
 }
 
-/// Tells people about the end of a run.
+/// Messages about the end of a run.
 pub(crate) struct RunMessages {
     notifier: Notifier,
     protocol: String,

@@ -20,7 +20,7 @@ const NAMES: usize = 3;
 pub(crate) struct Shelf {
     /// As [`skinrig_recorder::list`] gives them.
     pub sessions: Vec<SessionSummary>,
-    /// What is wrong with the catalogue, with the next step.
+    /// Problems of the catalogue, with the next step.
     pub notes: Vec<String>,
     known: BTreeMap<String, ListedSession>,
 }
@@ -126,14 +126,14 @@ pub(crate) fn estimate(of: &ListedAnalysis) -> Estimate {
     }
 }
 
-/// The current entries of a folder's embedded catalogue, and what is wrong with it. No catalogue at all is nothing wrong.
+/// Current entries of a folder's embedded catalogue, and its problems. A missing catalogue is no problem.
 fn from_catalogue(folder: &Path) -> (Listing, Vec<String>) {
     let address = Address::of_folder(folder);
     let place = address.to_string();
     let listed = Catalogue::open(address, Access::Read, crate::catalogue::automatic::WAIT)
         .and_then(|mut catalogue| {
             let listed = catalogue.list(folder)?;
-            // What was read does not depend on it.
+            // Failing to close does not affect the entries read.
             let _ = catalogue.close();
             Ok(listed)
         });

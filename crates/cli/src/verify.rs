@@ -176,7 +176,7 @@ fn compare_with_rebuilt(
         let name = file_name(&file);
         let bundled = folder.join(&name);
         if report.problems.iter().any(|p| p.place == name) {
-            // The manifest already tells that it is missing or another one.
+            // Already reported: missing or different from the manifest.
         } else if !report.names.contains(&name) {
             problems.push(Problem::new(&name, "this file", "none"));
         } else if !same_bytes(&file, &bundled).map_err(Failure::internal)? {

@@ -28,7 +28,7 @@ pub struct Look {
     pub difference_mm: Option<Interval>,
     /// Verdict on B; `None` if the skins cannot be compared yet.
     pub verdict: Option<Verdict>,
-    /// Why they cannot.
+    /// Reason why they cannot be compared.
     pub refused: Option<String>,
 }
 
@@ -45,7 +45,7 @@ pub struct SequentialComparison {
     pub complete: [u32; 2],
     /// Repetitions of A and B with scored presses that were never made.
     pub incomplete: [u32; 2],
-    /// What to expect of further repetitions.
+    /// Expected effect of further repetitions.
     pub outlook: Outlook,
 }
 
@@ -59,7 +59,7 @@ impl SequentialComparison {
 }
 
 /// Takes looks until one decides or the data end. Also returns both skins with only the presses of the last look, and the
-/// settings of that look: what is computed with them from these presses is valid whenever somebody stops.
+/// settings of that look: results computed with them from these presses stay valid at any stopping time.
 pub(crate) fn look(
     subjects: &[Subject; 2],
     margin: Option<f64>,

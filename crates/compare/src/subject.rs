@@ -19,7 +19,7 @@ pub struct SessionFacts {
     pub started: String,
     /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
     pub rig_kind: String,
-    /// What the data come from, a replay's from the recording: `simulated`, `emulated`, `bench` or `imported`; `None` when
+    /// Source of the data (of a replay: that of the recording): `simulated`, `emulated`, `bench` or `imported`; `None` when
     /// unknown.
     pub origin: Option<String>,
     /// Name of the rig.
@@ -29,7 +29,7 @@ pub struct SessionFacts {
     /// Documentation of the settings among them, by path.
     #[serde(skip)]
     pub docs: BTreeMap<String, String>,
-    /// CRC-32 and length of the chunks with events: what was recorded, whatever the session is called.
+    /// CRC-32 and length of the chunks with events: they identify a recording under any name.
     #[serde(skip)]
     pub chunks: BTreeSet<(u32, u64)>,
 }

@@ -1,22 +1,22 @@
-//! The sense of a run: which bytes it has, and the touch that is felt.
+//! The sense of touch of a run: the bytes fed to it, and the current touch.
 
 use skinrig_model::{HostTime, RawChunk, TouchKind};
 use skinrig_protocol::React;
 
 use crate::touch_sense::{Fed, SensedTouch, TouchSense};
 
-/// The sense, what it has of each stream, and the touch that it feels.
+/// The sense, the bytes fed to it, and the current touch.
 pub(crate) struct Feeling {
     pub(crate) sense: Box<dyn TouchSense>,
     pub(crate) fed: [Fed; 2],
-    /// Set once learning has begun: nobody needs the newest bytes before.
+    /// Set once learning has begun: only then are the newest bytes needed.
     pub(crate) learning: bool,
     pub(crate) touch: Option<FeltTouch>,
     /// Touch for which the tip is about to be lifted.
     pub(crate) lifting: Option<SensedTouch>,
 }
 
-/// The touch that is felt.
+/// The current touch.
 #[derive(Clone, Copy)]
 pub(crate) struct FeltTouch {
     /// Time of its onset.

@@ -2,22 +2,22 @@
 
 use skinrig_model::{HostTime, Look};
 
-/// Takes the looks that a plan declares. The controller never waits for an answer that [`poll`](Self::poll) does not have.
+/// Takes the looks that a plan declares. The controller polls and never waits for one.
 pub trait Looks {
-    /// Look `number` is due: every press up to it has an outcome, and its records are durable. A look that blocks here is
-    /// for rigs whose time stands still meanwhile.
+    /// Starts look `number`: every press up to it has an outcome, and its records are durable. May block only on rigs whose
+    /// time stands still meanwhile.
     fn begin(&mut self, number: u32);
 
-    /// The next look that is done, if any; never waits. `now` is the time of the run.
+    /// The next finished look, if any; never blocks. `now` is the time of the run.
     fn poll(&mut self, now: HostTime) -> Option<LookOutcome>;
 }
 
 /// Outcome of one look.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LookOutcome {
-    /// It was taken.
+    /// The look.
     Taken(Look),
-    /// It was not; the run continues.
+    /// The look failed; the run continues.
     NotTaken {
         /// Number of the look.
         number: u32,
@@ -26,7 +26,7 @@ pub enum LookOutcome {
     },
 }
 
-/// Why a look was not taken. Alpha spent on it is lost, which makes the others no less valid.
+/// Why a look was not taken. Its share of alpha is lost; the other looks stay valid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LookFault {
     /// The analysis of an earlier look took until the next one was due.
@@ -37,7 +37,7 @@ pub enum LookFault {
     Failed(String),
 }
 
-/// No looks: for plans that declare none.
+/// For plans that declare no looks.
 pub(crate) struct NoLooks;
 
 impl Looks for NoLooks {

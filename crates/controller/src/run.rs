@@ -153,7 +153,7 @@ impl<'a> Run<'a> {
         self
     }
 
-    /// Feels touches with `sense`; without it, a plan that wants them felt runs as if it did not.
+    /// Feels touches with `sense`. Without it, the plan's request for touches is ignored.
     #[must_use]
     pub fn feeling(mut self, sense: Box<dyn TouchSense>) -> Self {
         self.parts.sense = sense;

@@ -21,7 +21,7 @@ pub trait RecordSink {
         Ok(())
     }
 
-    /// Most bytes per camera that [`newest`](Self::newest) takes at the next tick, while somebody looks at the newest events; otherwise `None`.
+    /// Most bytes per camera that [`newest`](Self::newest) takes at the next tick; `None` while no program asks for the newest events.
     fn wants_newest(&mut self) -> Option<usize> {
         None
     }

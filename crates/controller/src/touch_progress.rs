@@ -1,23 +1,23 @@
-//! What a run has felt so far, for display, derived from its records alone.
+//! Touches that a run has felt so far, counted from its records, for display.
 
 use skinrig_model::{AttemptId, PressRole, TouchEstimate, TouchKind};
 
-/// What a run has felt since it began to feel.
+/// Touches since the run began to feel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TouchProgress {
     /// The newest estimate or reaction.
     pub latest: TouchEstimate,
-    /// Whether a touch is being felt.
+    /// True during a touch.
     pub touching: bool,
     /// Attempts at scored presses since then.
     pub presses: usize,
-    /// How many of them were felt, on their way to the skin or back too.
+    /// How many of them were felt, including during approach and retraction.
     pub felt: usize,
     /// Touches felt between presses.
     pub between: usize,
     /// How often bytes were skipped because the estimator could not keep up.
     pub skipped: usize,
-    /// Whether the attempt under way, if one is, is at a scored press.
+    /// True during an attempt at a scored press.
     is_scored: bool,
     /// Attempt that the last touch was counted for; `None`: between presses.
     counted: Option<AttemptId>,

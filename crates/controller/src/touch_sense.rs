@@ -6,42 +6,42 @@ use skinrig_model::{CameraId, HostTime, RawChunk, TouchKind, TouchRegion};
 /// Feels touches in the bytes of both cameras. The controller never waits for an answer that [`poll`](Self::poll) does not have,
 /// and no limit or guard depends on one.
 pub trait TouchSense {
-    /// Whether it wants bytes at all.
+    /// False if it takes no bytes and never answers.
     fn is_on(&self) -> bool {
         true
     }
 
-    /// Learning is due: the calibrating presses have outcomes, and their records are durable. One that blocks here is for rigs whose
-    /// time stands still meanwhile.
+    /// Starts to learn: the calibration presses have outcomes, and their records are durable. May block only on rigs whose time stands
+    /// still meanwhile.
     fn learn(&mut self);
 
     /// The next bytes of a camera; each byte comes once, in order. `lost` bytes are missing before them.
     fn feed(&mut self, camera: CameraId, lost: u64, bytes: &[u8]);
 
-    /// The next answer, if any; never waits. `now` is the time of the run.
+    /// The next answer, if any; never blocks. `now` is the time of the run.
     fn poll(&mut self, now: HostTime) -> Option<SenseAnswer>;
 }
 
 /// An answer of a [`TouchSense`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum SenseAnswer {
-    /// It has learnt, and feels from now on.
+    /// It has learnt and reports touches from now on.
     Ready {
         /// Number of places learnt.
         places: usize,
         /// Whether positions have regions.
         has_regions: bool,
     },
-    /// It feels nothing in this run, or no more.
+    /// It reports no touches, or no more, in this run.
     Off(SenseFault),
     /// Something was felt.
     Felt(SensedTouch),
 }
 
-/// Why nothing is felt.
+/// Why no touches are reported.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SenseFault {
-    /// The presses teach too little, or cannot be analysed.
+    /// The calibration presses are too few or cannot be analysed.
     #[error("learning from the calibration presses failed: {0}")]
     NotLearnt(String),
     /// The estimator failed.
@@ -49,14 +49,14 @@ pub enum SenseFault {
     Failed(String),
 }
 
-/// Something felt, before the run knows it.
+/// A touch as the sense reports it; the run adds its own time and the attempt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensedTouch {
     /// Events up to this time are in it.
     pub until: HostTime,
     /// Standard deviation of that time, ns.
     pub until_sd_ns: i64,
-    /// What was felt.
+    /// Kind of the report.
     pub kind: TouchKind,
     /// Position, mm.
     pub at_mm: Option<[f64; 2]>,
@@ -80,7 +80,7 @@ impl SensedTouch {
     }
 }
 
-/// No sense: for plans without one.
+/// For plans that feel no touches.
 pub(crate) struct NoSense;
 
 impl TouchSense for NoSense {
@@ -100,21 +100,21 @@ impl TouchSense for NoSense {
 /// Which bytes of a camera the sense has.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Fed {
-    /// The chunk being filled,
+    /// Number of the chunk being filled.
     seq: u64,
-    /// and how many of its bytes were fed.
+    /// Bytes of that chunk already fed.
     bytes: usize,
 }
 
 impl Fed {
-    /// Position from which bytes of the open chunk are wanted.
+    /// Position in the open chunk of the first byte not yet fed.
     pub(crate) const fn next(self) -> usize {
         self.bytes
     }
 
-    /// Feeds what is new of the open chunk.
+    /// Feeds the new bytes of the open chunk.
     pub(crate) fn open(&mut self, camera: CameraId, open: &OpenChunk, sense: &mut dyn TouchSense) {
-        // A camera on its own thread answers an earlier request: chunks on their way come first.
+        // A camera on its own thread may answer an earlier request: chunks in transit come first.
         let Some(known) = self.bytes.checked_sub(open.from) else {
             return;
         };
@@ -126,7 +126,7 @@ impl Fed {
         self.bytes = open.from + open.bytes.len();
     }
 
-    /// Feeds what is new of a complete chunk.
+    /// Feeds the new bytes of a complete chunk.
     pub(crate) fn complete(&mut self, chunk: &RawChunk, sense: &mut dyn TouchSense) {
         let known = if chunk.seq == self.seq { self.bytes } else { 0 };
         let rest = chunk.bytes.get(known..).unwrap_or_default();
@@ -182,7 +182,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever was seen of open chunks, also late or twice, every byte comes once and every loss where it was.
+        /// Open chunks may be seen late, twice or not at all: every byte is fed once, and every loss at its place.
         #[test]
         fn every_byte_is_fed_once(
             lengths in prop::collection::vec((0usize..6, 0u64..3), 1..12),

@@ -111,7 +111,7 @@ pub struct OpenChunk {
 }
 
 impl OpenChunk {
-    /// The whole words of a chunk under way from `from` on; `None` without any.
+    /// The whole words of an open chunk from `from` on; `None` without any.
     #[must_use]
     pub fn of(seq: u64, lost_before: u64, chunk: &[u8], from: usize) -> Option<Self> {
         let end = chunk.len() / WORD_BYTES * WORD_BYTES;

@@ -56,7 +56,7 @@ struct StoredCommit {
     tables_sha256: BTreeMap<String, String>,
 }
 
-/// What a lake has of a session.
+/// State of a session in a lake.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LakeState {
     /// Nothing.
@@ -102,7 +102,7 @@ impl Lake {
         }
     }
 
-    /// What the lake has of the session with this analysis. Reads the tables that the commit names.
+    /// State of the session with this analysis. Reads the tables that the commit names.
     ///
     /// # Errors
     /// [`ExportError::OtherContent`] if it has the session with another content; [`ExportError::File`] when a commit or a table

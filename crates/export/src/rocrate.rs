@@ -20,12 +20,12 @@ const MAX_METADATA_BYTES: u64 = 64 << 20;
 /// Most folders within each other.
 const MAX_DEPTH: usize = 8;
 
-/// What a crate states beside its files.
+/// Description of a crate.
 #[derive(Debug, Clone, Default)]
 pub struct CrateDescription {
     /// Title.
     pub title: String,
-    /// What it holds.
+    /// Description of its contents.
     pub description: String,
     /// Licence, by its SPDX identifier.
     pub license: String,
@@ -33,7 +33,7 @@ pub struct CrateDescription {
     pub published_on: String,
     /// Authors, in order.
     pub people: Vec<CratePerson>,
-    /// Who publishes it.
+    /// Publisher.
     pub publisher: Option<CrateOrganisation>,
     /// Name and version of the program that made it.
     pub software: String,

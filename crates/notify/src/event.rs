@@ -1,4 +1,4 @@
-//! Events that people are told about, and their text.
+//! Events that messages report, and their text.
 
 use std::path::Path;
 
@@ -31,7 +31,7 @@ pub enum Subject<'a> {
     },
     /// A night raised trend alarms.
     Alarms(RaisedAlarms<'a>),
-    /// Somebody tests the channels.
+    /// A test of the channels.
     Test,
 }
 

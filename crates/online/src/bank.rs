@@ -1,6 +1,6 @@
 //! The bank of tests: one cumulative sum of log likelihood ratios per place and event rate of a beginning touch.
 //!
-//! A slot adds to every sum what its events say for "a touch at this place adds so many events per slot, in these regions"
+//! A slot adds to every sum the evidence of its events for "a touch at this place adds so many events per slot, in these regions"
 //! against the background; a sum never falls below 0 (Page 1954), so that each begins at the best moment. The largest one is
 //! the statistic.
 
@@ -39,13 +39,13 @@ pub(crate) struct Best {
 #[derive(Debug, Clone)]
 pub(crate) struct Bank {
     table: LogTable,
-    /// Shares of each camera's regions, one after another,
+    /// Shares of all regions, one region after another.
     shares: Vec<Share>,
-    /// from here on, camera after camera.
+    /// Index of the first share of each region, camera after camera.
     starts: Vec<u32>,
     /// Expected events per slot, as steps of a ratio.
     levels: Vec<i32>,
-    /// What a slot costs at each level, 2^-20 nats, by place: the touch's events in all its regions.
+    /// Cost of a slot at each level, 2^-20 nats, by place: the touch's events in all its regions.
     costs: Vec<i64>,
     gains: Vec<i64>,
     sums: Vec<i64>,

@@ -1,4 +1,4 @@
-//! What one camera sent around the calibration presses: counts on the idle skin, at the start of presses, in them, and after
+//! Event counts of one camera around the calibration presses: on the idle skin, at the start of presses, during and after
 //! them.
 
 use skinrig_analysis::{EventSource, EventSourceError};

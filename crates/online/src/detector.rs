@@ -12,22 +12,22 @@ use crate::model::TouchModel;
 use crate::slots::{SlotCounts, Slots, Uncounted};
 use crate::touch::{Phase, Touch};
 
-/// What was felt.
+/// Kind of a decision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Felt {
     /// A touch began.
     Onset,
-    /// It was none: its evidence is gone before it was certain.
+    /// The onset was false: its evidence vanished before it was certain.
     Withdrawn,
-    /// It ended.
+    /// The touch ended.
     Release,
 }
 
 /// A decision.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
-    /// What was felt.
+    /// Its kind.
     pub felt: Felt,
     /// Host time up to which its events arrived, µs: the earliest time at which it can be known.
     pub host_us: i64,

@@ -1,4 +1,4 @@
-//! What was felt while a session was recorded, beside its analysis.
+//! Touches felt while a session was recorded, compared with its analysis.
 
 use skinrig_analysis::Analysis;
 use skinrig_analysis::metrics::quantile;

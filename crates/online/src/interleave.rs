@@ -1,4 +1,4 @@
-//! Reads both cameras of an event source at once and hands their slices over in order of time.
+//! Reads both cameras of an event source at once and merges their slices in order of time.
 
 use std::sync::mpsc::{Receiver, sync_channel};
 

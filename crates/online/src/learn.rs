@@ -51,7 +51,7 @@ struct TailSum {
     pressed: f64,
 }
 
-/// Mean fading, until it cannot be told from nothing.
+/// Mean fading, until it is within the noise.
 fn tail(training: &Training, cameras: &[CameraCounts; 2]) -> Vec<[f64; 2]> {
     let mut sums = [[TailSum::default(); 2]; TAIL_BINS];
     for camera in cameras {

@@ -24,7 +24,7 @@ pub(crate) fn steps(value: f64) -> i32 {
     libm::round(f64::from(OCTAVE) * libm::log2(value)) as i32
 }
 
-/// What a ratio in steps stands for.
+/// Value of a ratio in steps.
 pub(crate) fn ratio(steps: i32) -> f64 {
     libm::exp2(f64::from(steps) / f64::from(OCTAVE))
 }

@@ -1,4 +1,4 @@
-//! What the detector has learnt from calibration presses: the idle rate of every region, how a touch begins at each place, and
+//! Model that the detector learns from calibration presses: the idle rate of every region, how a touch begins at each place, and
 //! how a release fades.
 
 use serde::{Deserialize, Serialize};

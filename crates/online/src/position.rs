@@ -157,7 +157,7 @@ impl CameraWindow {
         self.events.clear();
     }
 
-    /// What the camera saw until `until_us`, and how many events.
+    /// Features of the events until `until_us`, and the number of events.
     fn features(
         &mut self,
         settings: &AnalysisSettings,

@@ -1,4 +1,4 @@
-//! Everything that calibration presses teach about a skin, for the process that feels it: a plain value.
+//! Everything learnt from the calibration presses of a session, as a plain value for the process that feels touches.
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::locator::{FittedLocator, LocatorModelError};
@@ -9,7 +9,7 @@ use crate::model::TouchModel;
 use crate::position::PositionEstimator;
 use crate::settling::Settling;
 
-/// What was learnt from the calibration presses of a session.
+/// Model of a skin, learnt from the calibration presses of a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SkinModel {
     pub(crate) settings: AnalysisSettings,

@@ -170,13 +170,13 @@ impl Slots {
         }
     }
 
-    /// Hands over every complete slot.
+    /// Passes every complete slot to `each`.
     pub(crate) fn close(&mut self, each: impl FnMut(i64, [&SlotCounts; 2])) {
         let [one, two] = &self.cameras;
         self.close_until(one.open.min(two.open), each);
     }
 
-    /// Hands over every slot that has begun.
+    /// Passes every slot that has begun to `each`.
     pub(crate) fn finish(&mut self, each: impl FnMut(i64, [&SlotCounts; 2])) {
         let [one, two] = &self.cameras;
         self.close_until(one.open.max(two.open) + 1, each);

@@ -11,16 +11,16 @@ const QUIET: u32 = 8;
 /// and moves again when it holds more than this part, and twice the rest.
 const BUSY: u32 = 5;
 
-/// Where a touch stands.
+/// Phase of a touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Phase {
     /// The tip goes in.
     Pressing,
-    /// It rests.
+    /// The tip rests.
     Holding,
-    /// It goes out.
+    /// The tip rises.
     Lifting,
-    /// It is out.
+    /// The tip has left.
     Over,
 }
 

@@ -1,4 +1,4 @@
-//! What the detector learns from: calibration presses, and the idle times between them. Scored presses are no part of it.
+//! Training data of the detector: calibration presses and the idle times between them, never scored presses.
 
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{ClockFit, PressResult};

@@ -14,12 +14,12 @@ use crate::under_way::UnderWay;
 /// Bytes that wait for the thread before further ones are skipped: 0.5 s of two cameras at 1 Mev/s.
 const MOST_QUEUED: usize = 4 << 20;
 
-/// What a worker says.
+/// Result of a worker.
 #[derive(Debug, Clone, PartialEq)]
 pub enum News {
     /// Touches are felt from now on.
     Started,
-    /// Nothing is felt any more.
+    /// No touches are felt any more.
     Failed(StreamError),
     /// An estimate, with the standard deviation of its times, µs.
     Estimate(Estimate, f64),
@@ -31,7 +31,7 @@ pub enum News {
     },
 }
 
-/// What a worker gets.
+/// Input of a worker.
 enum Job {
     Bytes {
         camera: CameraId,
@@ -191,7 +191,7 @@ impl Thread {
 
 fn work(mut core: Core, jobs: &Receiver<Job>, say: &Sender<News>, queued: &AtomicUsize) {
     for job in jobs {
-        // Fails only if nobody listens any more.
+        // Fails only if the receiver is gone.
         let each = |news| drop(say.send(news));
         match job {
             Job::Bytes {
@@ -212,7 +212,7 @@ fn work(mut core: Core, jobs: &Receiver<Job>, say: &Sender<News>, queued: &Atomi
 mod tests {
     use super::*;
 
-    /// What does not fit is skipped until everything queued was taken, counted, and said before what follows.
+    /// Bytes that do not fit are skipped until the queue is empty; they are counted, and reported before the bytes that follow.
     #[test]
     fn a_full_queue_skips_and_says_so() {
         let (jobs, todo) = channel();

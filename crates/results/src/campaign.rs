@@ -11,7 +11,7 @@ use skinrig_statistics::{Settings, StoppingRule, stop_sample};
 
 use crate::error::{LookFault, ResultsError};
 
-/// The part of a plan that tells whether it declares looks; plans of every version have it.
+/// The part of a plan, in every version, that shows whether it declares looks.
 #[derive(Deserialize)]
 struct DeclaresLooks {
     stop: Option<serde::de::IgnoredAny>,

@@ -59,7 +59,7 @@ pub enum ResultsError {
     /// A plan that declares looks cannot be read.
     #[error("cannot read the plan in the session: {0}")]
     Plan(serde_json::Error),
-    /// The session does not teach what a touch is.
+    /// Nothing could be learnt from the session.
     #[error(transparent)]
     NotLearnt(#[from] NotLearnt),
     /// A look at a campaign found nothing that may be used.
@@ -101,7 +101,7 @@ pub enum LookFault {
     Interval(#[from] ComparisonError),
 }
 
-/// Why a session does not teach what a touch is.
+/// Why nothing could be learnt from a session.
 #[derive(Debug, thiserror::Error)]
 pub enum NotLearnt {
     /// Clocks start again in each leg.

@@ -21,7 +21,7 @@ pub struct SessionEvents {
     stop: Option<Arc<AtomicBool>>,
 }
 
-/// A pass over the events that was told to stop.
+/// A pass over the events was cancelled.
 #[derive(Debug, thiserror::Error)]
 #[error("reading the events was stopped")]
 pub(crate) struct PassStopped;

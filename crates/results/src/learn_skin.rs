@@ -1,4 +1,4 @@
-//! What the calibration presses of a session that is under way teach about its skin.
+//! Learns how the skin of a session, which may still be recorded, responds to touch.
 
 use std::path::Path;
 
@@ -9,11 +9,11 @@ use crate::session::Session;
 use crate::settings::AnalysisOptions;
 use crate::stages::analyze;
 
-/// Learns from the session at `path`, which may be under way, for at most this many false alarms per second (above 0). The clocks are
-/// those of its only leg.
+/// Learns from the calibration presses of the session at `path`, which may still be recorded. `false_alarms_hz`: highest rate of false
+/// alarms, above 0. The clocks are those of its only leg.
 ///
 /// # Errors
-/// [`ResultsError`] if it has no analysis; [`ResultsError::NotLearnt`] if that must not be used, or teaches too little.
+/// [`ResultsError`] if it has no analysis; [`ResultsError::NotLearnt`] if that is INVALID or has too few usable presses.
 pub fn learn_skin(path: &Path, false_alarms_hz: f64) -> Result<SkinModel, ResultsError> {
     let analyzed = analyze(path, AnalysisOptions::default())?;
     if !analyzed.legs.is_empty() {

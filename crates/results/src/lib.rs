@@ -7,7 +7,7 @@
 //! 4. [`AlignedSession::analyze`]: runs the complete analysis, with the robot's path and, on request, the public code's
 //!    results.
 //!
-//! [`analyze`] runs all four. [`take_look`] looks at a campaign that is under way. The command line parses its arguments, calls this crate and prints.
+//! [`analyze`] runs all four. [`take_look`] looks at a running campaign.
 
 mod campaign;
 mod contacts;

@@ -1,4 +1,4 @@
-//! A look at a campaign that may be under way.
+//! A look at a campaign, during or after its recording.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::error::{LookFault, ResultsError};
 use crate::settings::AnalysisOptions;
 use crate::stages::analyze;
 
-/// Look `number` at the session at `path`, which may be under way.
+/// Takes look `number` at the session at `path`, which may still be recorded.
 ///
 /// # Errors
 /// [`ResultsError`] if it has no analysis; [`ResultsError::NoLook`] if its numbers must not be used, or are too few.

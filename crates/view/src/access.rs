@@ -1,4 +1,4 @@
-//! Owns who may ask: the token, and the checks against DNS rebinding and other sites' requests.
+//! Owns the access control: the token, and the checks against DNS rebinding and other sites' requests.
 //!
 //! Every answer below `/api` needs the token in the `Authorization` header. It is no cookie: a browser sends it for no other page, and it
 //! stands behind the `#` of the link, which browsers do not send at all.

@@ -34,7 +34,7 @@ pub(crate) fn check(has_control: bool) -> Result<(), Problem> {
     ))
 }
 
-/// Hands the request to the run; its state after the acknowledgement.
+/// Sends the request to the run; returns the state after its acknowledgement.
 pub(crate) fn control(
     lab: &dyn Lab,
     folder: &Folder,

@@ -166,7 +166,7 @@ fn press(
     value
 }
 
-/// What each camera saw, with the direction of its ray in the skin's plane.
+/// View of each camera, with the direction of its ray in the skin's plane.
 fn views(found: &PressResult, geometry: &StereoGeometry) -> Value {
     let view = |camera: CameraId| {
         let view = found.views[camera.index()].as_ref()?;

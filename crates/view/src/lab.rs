@@ -83,7 +83,7 @@ pub struct SettingValues {
     pub b: String,
 }
 
-/// Everything that the server asks of its surroundings. Calls may block; none comes from an async task.
+/// Services that the server needs from its program. Calls may block; none comes from an async task.
 pub trait Lab: Send + Sync + 'static {
     /// State of the run that writes `session`; `None` if none answers.
     fn run(&self, session: &Path) -> Option<RunState>;
@@ -91,7 +91,7 @@ pub trait Lab: Send + Sync + 'static {
     /// Newest bytes of camera 1 and camera 2 of the run that writes `session`, with those that are not in the file yet; `None` if none answers.
     fn newest(&self, session: &Path) -> Option<[NewestBytes; 2]>;
 
-    /// Hands a request (`pause`, `pause_now`, `resume`, `stop`, `abort` or `halt`) to the run that writes `session`, and returns the run's
+    /// Sends a request (`pause`, `pause_now`, `resume`, `stop`, `abort` or `halt`) to the run that writes `session`, and returns the run's
     /// state after its acknowledgement.
     ///
     /// # Errors

@@ -17,7 +17,7 @@ use crate::problem::Problem;
 /// Sessions that are kept, at most. Each holds its header and the index of its chunks.
 const MOST_KEPT: usize = 8;
 
-/// What was parsed of one session.
+/// Parsed parts of one session.
 pub(crate) struct ParsedSession {
     pub session_id: String,
     pub header: RunHeader,
@@ -68,7 +68,7 @@ impl Stamp {
     }
 }
 
-/// What was parsed lately, the newest last.
+/// Recently parsed sessions, the newest last.
 #[derive(Default)]
 pub(crate) struct Cache(Mutex<Vec<(Stamp, Arc<ParsedSession>)>>);
 

@@ -13,7 +13,7 @@ use skinrig_results::ResultsError;
 
 use crate::lab::LabError;
 
-/// Why a request is not fulfilled: a status, and a message with expected, found and a next step.
+/// Reason to reject a request: a status, and a message with expected, found and a next step.
 #[derive(Debug)]
 pub(crate) struct Problem {
     status: StatusCode,

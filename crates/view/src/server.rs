@@ -17,7 +17,7 @@ use crate::routes::{App, router};
 /// Threads that answer; what blocks runs on further ones.
 const WORKERS: usize = 2;
 
-/// What to serve, and to whom.
+/// Served folder, address and rights.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// The folder of sessions.

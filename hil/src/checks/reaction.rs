@@ -32,7 +32,7 @@ pub(super) fn reaction(check: &Check, bench: &mut dyn Bench, findings: &mut Find
                 ),
             }
         }
-        // Equal or not, whatever the analysis says of the session; what it found explains why there may be nothing to compare.
+        // Report the findings of the analysis in any case: they explain why there may be nothing to compare.
         match bench.compare_online(&run.files) {
             Ok(comparison) => differences(comparison, findings),
             Err(why) if analysis.is_valid() => findings.evidence.push(*why),
@@ -53,7 +53,7 @@ fn never_felt(session: &str) -> String {
     )
 }
 
-/// What was felt while the session was recorded, against its analysis.
+/// Touches felt while the session was recorded, compared with its analysis.
 fn values(felt: &FeltTouches, findings: &mut Findings) {
     if felt.presses > 0 {
         let share = 100.0 * f64::from(felt.felt) / f64::from(felt.presses);

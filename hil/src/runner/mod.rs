@@ -182,7 +182,7 @@ impl NightRun<'_, '_> {
                         ..result
                     };
                 }
-                // What an earlier attempt found stands.
+                // The findings of an earlier attempt stand.
                 ended = Some(format!("a repeat did not apply: {reason}"));
                 break;
             }

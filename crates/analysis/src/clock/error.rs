@@ -21,7 +21,7 @@ pub enum LineError {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum MarksError {
-    /// The rig does not say which input of the cameras shows marks.
+    /// The rig does not name the camera input for marks.
     #[error("the rig has no trigger channel")]
     NoChannel,
     /// The camera's trigger input shows no complete mark.

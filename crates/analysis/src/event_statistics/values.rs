@@ -1,4 +1,4 @@
-//! What is known of the events of one camera.
+//! Statistics of the events of one camera.
 
 use serde::Serialize;
 use skinrig_model::CameraId;

@@ -9,7 +9,7 @@ use super::phases::{IDLE, PHASES, PRESS, PhasePlan, RELEASE};
 /// A pixel with this many events in the idle time of a press is hot: its events count in none of its phases.
 const HOT: u8 = 3;
 
-/// What one camera saw in the phases of one press.
+/// Events of one camera in the phases of one press.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PressPhases {
     /// Row of the press in the plan.
@@ -20,7 +20,7 @@ pub(crate) struct PressPhases {
     pub seconds: [f64; PHASES],
     /// Change of the image by the press and by the release.
     pub images: [ImageSums; 2],
-    /// What is left of the change by the press in the end.
+    /// Change of the image that remains after the press.
     pub rest: ReturnSums,
 }
 

@@ -1,4 +1,4 @@
-//! Owns the change of an image in events: ON minus OFF of each pixel, and what sums over its pixels say.
+//! Owns the change of an image in events: ON minus OFF of each pixel, and sums over its pixels.
 
 use skinrig_model::SENSOR_WIDTH;
 
@@ -24,7 +24,7 @@ pub(crate) struct ImageSums {
     pub peaks: [u64; 2],
 }
 
-/// What is left of a change.
+/// Remainder of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct ReturnSums {
     /// Sum of what is left in the direction of the change, events.
@@ -87,7 +87,7 @@ impl Image {
         }
     }
 
-    /// What this image shows of `change` in its direction.
+    /// Projection of this image on `change`.
     pub(super) fn along(&self, change: &Self) -> ReturnSums {
         let mut sums = ReturnSums::default();
         for (own, change) in self.pixels.iter().zip(&change.pixels) {

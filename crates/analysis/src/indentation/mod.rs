@@ -91,7 +91,7 @@ pub(crate) fn estimate(
     })
 }
 
-/// What a quantity was learnt from: press and measurement of each teacher.
+/// Training data of a quantity: press and measurement of each calibration press.
 type Lesson = (Learnt, Vec<(PressId, u32, f64, f64)>);
 
 fn positive(value: Option<f64>) -> Option<f64> {

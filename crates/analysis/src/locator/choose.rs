@@ -85,7 +85,7 @@ pub(crate) fn choose(
 struct Candidate {
     method: &'static dyn Method,
     fit: Result<(FittedLocator, Option<Hyperparameters>), FitError>,
-    /// For each press: what it gives at held-out locations.
+    /// Result of each press at held-out locations.
     held_out: Option<Vec<HeldOutResult>>,
     /// Errors in held-out repetitions, mm.
     over_repetitions: Option<Vec<f64>>,
@@ -96,7 +96,7 @@ struct HeldOutResult {
     /// Estimate minus truth, mm; `None` without a position.
     error: Option<[f64; 2]>,
     error_mm: f64,
-    /// `None` without a position, or if the locator knows nothing about its error.
+    /// `None` without a position, or if the locator has no error model.
     reached: Option<HeldOutError>,
 }
 

@@ -1,9 +1,9 @@
-//! What the cameras say about a press: all that a locator sees of it.
+//! Features of a press in both cameras: the only input of a locator.
 
 use crate::estimators::ColumnEstimate;
 use crate::result::{PressResult, PressView};
 
-/// What one camera says about a press.
+/// Features of a press in one camera.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CameraFeatures {
     /// Centroid column, px; `None` without a cluster.
@@ -50,7 +50,7 @@ impl CameraFeatures {
     }
 }
 
-/// What both cameras say about a press. It holds no position: a locator cannot see where a press was made.
+/// Features of a press in both cameras. They hold no position: a locator cannot see where the press was.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Features {
     /// Centroid column in each camera, px.

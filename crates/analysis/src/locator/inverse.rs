@@ -53,7 +53,7 @@ struct StartPoint {
     open: [f64; READINGS],
 }
 
-/// What both cameras read.
+/// Readings of both cameras.
 struct Readings {
     columns: [f64; 2],
     values: [f64; 2],
@@ -199,7 +199,7 @@ impl Inverse {
         })
     }
 
-    /// Variance of the expected reading, px²: that of the field, and that of the geometry where the field knows nothing.
+    /// Variance of the expected reading, px²: that of the field, and that of the geometry where the field has no data.
     fn model_variance(&self, read: &Readings, i: usize, at: [f64; 2], open: f64) -> f64 {
         let Some(field) = self.field(i) else {
             return 0.0;

@@ -63,7 +63,7 @@ pub(super) fn smooth(instructions: InstructionSet, kernel: &Kernel, squares: &Lo
     )
 }
 
-/// What the likelihood depends on besides the hyperparameters.
+/// Data of the likelihood, besides the hyperparameters.
 pub(super) struct Likelihood<'a> {
     samples: &'a [Sample],
     weights: &'a [f64],

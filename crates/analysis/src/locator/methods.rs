@@ -16,7 +16,7 @@ use crate::distinct::distinct;
 use crate::result::{CameraField, LocatorModel, PositionPrior};
 use crate::sets::{CalibrationPress, CalibrationSet};
 
-/// What a method sees of a press.
+/// Input of a method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Feature {
     /// Centroid column of both cameras.
@@ -27,7 +27,7 @@ pub enum Feature {
     Spreads,
 }
 
-/// What a method needs.
+/// Requirements of a method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Requirements {
     /// Features of each press.
@@ -59,7 +59,7 @@ pub trait Method: Sync {
     fn locator(&self) -> Locator;
     /// Grows with every change of its numbers.
     fn version(&self) -> u32;
-    /// What it needs.
+    /// Its requirements.
     fn needs(&self) -> Requirements;
     /// Learns from calibration presses.
     ///

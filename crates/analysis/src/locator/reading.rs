@@ -1,5 +1,5 @@
-//! What a camera reads of a press, and what it is expected to read at a position: the direction of the press, by the
-//! geometry; or the column itself, by a polynomial that knows no geometry.
+//! Readings of a camera for a press, measured and expected at a position: the direction of the press, by the geometry; or
+//! the column itself, by a polynomial that needs no geometry.
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH, StereoGeometry};
@@ -22,7 +22,7 @@ pub(super) enum Reading {
     Bearing {
         geometry: StereoGeometry,
         covariance: Option<DMatrix<f64>>,
-        /// Covariance that remains after a remount, which the fields do not know.
+        /// Covariance that remains after a remount and is not part of the fields.
         remount: Option<DMatrix<f64>>,
     },
     /// Columns, px: one polynomial per camera in mm.
@@ -207,7 +207,7 @@ mod tests {
                 reading.of_column(1, column + 1e-4).0 - reading.of_column(1, column - 1e-4).0;
             assert!((change / 2e-4 - by).abs() < 1e-6, "{column}");
         }
-        // What a camera reads of a point is what is expected there.
+        // The reading of a point is the expected one.
         let at = Point2::new(3.0, 4.0);
         let column = geometry.cameras[0].column_of_point(at).unwrap();
         let (read, _) = reading.of_column(0, column);

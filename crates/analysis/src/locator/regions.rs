@@ -42,7 +42,7 @@ impl Regions {
     /// From held-out presses that have a position; a region is a statement about those. `locations`: number of their
     /// locations.
     ///
-    /// A model learnt from few presses knows too little about how wrong it is between and beyond them: its variance is
+    /// A model learnt from few presses underestimates its error between and beyond them: its variance is
     /// multiplied by the most likely factor. What remains is a common size, which [`levels`] finds.
     pub(super) fn from_held_out(reached: &[HeldOutError], locations: usize) -> Self {
         let likely = INFLATION_LOG2

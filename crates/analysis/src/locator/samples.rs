@@ -1,4 +1,4 @@
-//! What a field learns from: for one camera, how far a reading is from the one expected at the measured positions.
+//! Training data of a field: for one camera, deviations of readings from those expected at the measured positions.
 
 use super::robust::{reference_events, response, scale, weight};
 use crate::sets::CalibrationPress;

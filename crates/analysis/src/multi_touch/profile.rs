@@ -1,4 +1,4 @@
-//! What a single touch looks like in one camera: shape and widths over columns, learnt from the calibration presses.
+//! Profile of a single touch in one camera: shape and widths over columns, learnt from the calibration presses.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -77,7 +77,7 @@ pub(super) struct Example<'a> {
     pub(super) sight: &'a TouchSight,
 }
 
-/// What touches look like in one camera.
+/// Profile of touches in one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Profile {
     /// Density over standard deviations.

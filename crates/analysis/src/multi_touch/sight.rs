@@ -1,4 +1,4 @@
-//! What one camera saw of a press: events on bins of columns and milliseconds, without those of hot pixels.
+//! Events of a press in one camera: on bins of columns and milliseconds, without those of hot pixels.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Owns the ways in which a session can be other than its documents say.
+//! Owns the ways in which a session can differ from its documents.
 
 use std::fmt;
 

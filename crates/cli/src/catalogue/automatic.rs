@@ -12,7 +12,7 @@ use crate::paths::{file_name, folder_of};
 /// Longest wait for another program that writes the catalogue, such as a second run that ends at the same moment.
 pub(crate) const WAIT: Duration = Duration::from_millis(200);
 
-/// Registers `session` in the embedded catalogue of its folder; says so if that fails. The session is then stale, until
+/// Registers `session` in the embedded catalogue of its folder; prints a note if that fails. Its entry is then stale until
 /// `skinrig catalogue register` or the next command that changes it.
 pub(crate) fn register(session: &Path) {
     if let Err(e) = try_register(session) {
@@ -23,7 +23,7 @@ pub(crate) fn register(session: &Path) {
     }
 }
 
-/// Registers those of `sessions`, all in `folder`, whose entries are stale; says so if that fails. For commands without a robot: waits
+/// Registers those of `sessions`, all in `folder`, whose entries are stale; prints a note if that fails. For commands without a robot: waits
 /// for another program that writes the catalogue.
 pub(crate) fn register_stale(folder: &Path, sessions: &[PathBuf]) {
     let attempt = || {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use skinrig_export::challenge::{Guest, GuestError};
 
-/// Longest time between two looks at whether the process has ended.
+/// Interval between checks whether the process has ended.
 const LOOK: Duration = Duration::from_millis(5);
 /// Time for a process that closed its output to end.
 const CLOSED: Duration = Duration::from_secs(1);
@@ -45,7 +45,7 @@ impl Process {
                 let written = std::iter::once(line)
                     .chain(std::iter::from_fn(|| to_write.try_recv().ok()))
                     .try_for_each(|line| writeln!(input, "{line}"));
-                // A guest that ended is noticed at its output.
+                // The reader notices a guest that has ended.
                 if written.and_then(|()| input.flush()).is_err() {
                     return;
                 }
@@ -91,7 +91,7 @@ impl Process {
 impl Guest for Process {
     fn tell(&mut self, line: String) {
         if let Some(lines) = &self.lines {
-            // A writer that stopped is noticed at the guest's output.
+            // The reader notices a writer that has stopped.
             let _ = lines.send(line);
         }
     }

@@ -25,7 +25,7 @@ const MAX_SKINS: usize = 8;
 pub(super) struct SkinSessions {
     pub subject: Subject,
     pub paths: Vec<PathBuf>,
-    /// What a selection changes in each session; empty without one.
+    /// Effect of a selection on each session; empty without one.
     pub selected: Vec<SelectedResult>,
 }
 
@@ -128,7 +128,7 @@ fn session_paths(folder: &Path, prototype: Option<&str>) -> Result<Vec<Target>, 
         .collect())
 }
 
-/// What the variant `name` changes in these sessions.
+/// Changed settings of the variant `name` in these sessions.
 fn changes(paths: &[PathBuf], name: &str) -> Result<String, Failure> {
     let mut all = BTreeSet::new();
     for path in paths {

@@ -175,10 +175,10 @@ enum LampsError {
     /// The system cannot wait for its end.
     #[error("cannot be waited for: {0}")]
     Wait(#[source] io::Error),
-    /// It failed.
+    /// The program failed.
     #[error("expected success, found {0}")]
     Failed(ExitStatus),
-    /// It takes too long.
+    /// The program does not end in time.
     #[error("expected an end within {LAMPS_TIMEOUT:?}")]
     Late,
 }

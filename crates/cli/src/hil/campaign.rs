@@ -33,7 +33,7 @@ pub(super) fn run(bench: &mut RealBench, file: &Path) -> Result<CampaignRun, Pro
         rig,
         &folder,
         Some(preflight),
-        // The night tells people about itself.
+        // The night sends its own messages.
         None,
         bench.operator(),
     )

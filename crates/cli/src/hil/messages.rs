@@ -1,4 +1,4 @@
-//! Tells people about a night: its verdict, and the trend alarms that it raised.
+//! Messages about a night: its verdict, and the trend alarms that it raised.
 
 use skinrig_hil::night_folder::{self, NightFolder};
 use skinrig_model::Notification;

@@ -1,4 +1,4 @@
-//! A robot that exists only in a schedule: it is exactly where the schedule says.
+//! A robot that follows a schedule exactly: its position is always the scheduled one.
 //!
 //! Datasets recorded without skinrig have no pose stream. Importing one drives this indenter through the same
 //! controller, so that an imported session has the same shape as any other; its outcomes are marked as

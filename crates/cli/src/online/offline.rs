@@ -93,7 +93,7 @@ impl<'a> Comparison<'a> {
         self.compared.equal += usize::from(equal);
     }
 
-    /// What was compared so far.
+    /// Result so far.
     pub(super) const fn result(&self) -> Compared {
         self.compared
     }

@@ -1,4 +1,4 @@
-//! What a replay showed: how soon and how truly touches were felt, where, and how fast.
+//! Summary of a replay: delays and errors of detected touches and positions, and speed.
 
 use serde::Serialize;
 use skinrig_analysis::Analysis;

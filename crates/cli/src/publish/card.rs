@@ -66,7 +66,7 @@ const FILES: &str = "## Files\n\n\
     - `selected/`: results and tables with the selection, if there is one\n\n\
     `skinrig reproduce FOLDER` (`reproduce.sh`) compares every file with its checksum and derives every number again from the sessions.\n";
 
-/// What was left out, by whom and why.
+/// Excluded presses, with person and reason.
 fn selected(selection: Option<&Selection>) -> String {
     let Some(selection) = selection else {
         return String::new();

@@ -6,7 +6,7 @@ use skinrig_recorder::Problem;
 /// One comparison.
 #[derive(Debug, Serialize)]
 pub(super) struct Check {
-    /// What was compared.
+    /// Subject of the comparison.
     what: String,
     pub pass: bool,
     expected: String,

@@ -1,4 +1,4 @@
-//! What a crate holds beside bundles and results, and what it states: `publish` writes it, `reproduce` derives it again.
+//! Documents of a crate besides bundles and results, and its description: `publish` writes them, `reproduce` derives them again.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -54,7 +54,7 @@ pub(super) fn documents(
     Ok(files)
 }
 
-/// What the crate states beside its files.
+/// Description of the crate.
 pub(super) fn description(about: &Publication, headline: &Headline) -> CrateDescription {
     let folders = headline.sessions.iter().map(|session| {
         let what = format!(

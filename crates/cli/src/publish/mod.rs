@@ -225,7 +225,7 @@ fn one_session(
     described(&reader, analysis, without.as_ref(), bundle)
 }
 
-/// What a crate states of a session with this analysis.
+/// Description of a session with this analysis in a crate.
 fn described(
     reader: &SessionReader,
     analysis: Analysis,

@@ -45,7 +45,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs, json: bool) -> Outcome {
     }
     match signature::verify(&folder.join(METADATA), args.signers.as_deref()) {
         Ok(None) => {}
-        // Whose key it is has to be known before a signature says anything.
+        // A valid signature proves nothing without knowing whose key it is.
         Ok(Some(signature)) if signature.signer.is_none() => {
             if !checks.is_quiet {
                 outln!("note  signature: {signature}");
@@ -79,7 +79,7 @@ pub(crate) fn reproduce(args: &ReproduceArgs, json: bool) -> Outcome {
             .map(|(_, all)| all.get(&session.content_sha256));
         derived.extend(check_session(folder, session, presses, &mut checks)?);
     }
-    // What follows from anything that failed cannot be derived.
+    // Documents cannot be derived from anything that failed.
     if checks.failed() == 0 {
         let selection = selected
             .as_ref()

@@ -23,7 +23,7 @@ enum Line {
     Answered { at: usize, answer: Answer },
     /// A request was lost to a fault of a machine.
     Lost { at: usize, lost: String },
-    /// Something to know meanwhile.
+    /// A notice while the cluster works.
     Note { note: String },
     /// Nothing can be carried out.
     Failed { failed: String },
@@ -56,7 +56,7 @@ pub(super) fn run(
         for request in requests {
             let mut line = serde_json::to_vec(request).map_err(Failure::internal)?;
             line.push(b'\n');
-            // If the program is gone, its output says why.
+            // If the program is gone, its output shows why.
             let _ = input.write_all(&line);
         }
     }

@@ -47,7 +47,7 @@ fn in_a_process(request: &Request, threads: usize) -> Answered {
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn()?;
         if let Some(mut input) = child.stdin.take() {
-            // If the process is gone, its exit status says why.
+            // If the process is gone, its exit status shows why.
             let _ = input.write_all(&serde_json::to_vec(request)?);
         }
         let output = child.wait_with_output()?;

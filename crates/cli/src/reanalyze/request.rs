@@ -35,7 +35,7 @@ pub(crate) struct Request {
     pub analysis_version: u32,
 }
 
-/// What became of it.
+/// Outcome of a request.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Answer {
     /// Why there are no results.

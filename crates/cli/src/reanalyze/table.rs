@@ -13,7 +13,7 @@ use crate::terminal::Output;
 /// Rows that are shown without `-v`: with the lines around them, 12 lines.
 const ROWS: usize = 8;
 
-/// What became of a session.
+/// State of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum State {
     /// Not analysed yet.
@@ -120,7 +120,7 @@ impl Row {
         Some(format!("failed    {}: {}", self.name(), lines.join(" ")))
     }
 
-    /// What a reader has to see first: failed, then INVALID, then the others.
+    /// Order of display: failed, then INVALID, then the others.
     fn rank(&self) -> u8 {
         match (&self.error, self.is_invalid()) {
             (Some(_), _) => 0,

@@ -1,11 +1,11 @@
-//! What a caller gets for a request.
+//! Answer of a run to a request.
 
 use std::sync::mpsc::Receiver;
 
 use super::touches::TouchLine;
 use super::wire::Reply;
 
-/// What a caller gets.
+/// Answer to a request.
 #[derive(Debug)]
 pub(crate) enum Answer {
     /// One reply.

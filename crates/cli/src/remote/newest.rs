@@ -52,7 +52,7 @@ impl NewestBytes {
         self.began.elapsed().as_millis() as u64
     }
 
-    /// True while somebody looks.
+    /// True while a program asks for the newest bytes.
     pub(super) fn is_watched(&self) -> bool {
         let asked_ms = self.asked_ms.load(Ordering::Relaxed);
         asked_ms > 0 && self.now_ms() < asked_ms + WATCHED_FOR.as_millis() as u64

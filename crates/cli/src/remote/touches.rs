@@ -1,4 +1,4 @@
-//! Touches for programs that follow a run, as soon as it feels them.
+//! Sends touches to the programs that follow a run, as soon as it feels them.
 
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Mutex, PoisonError};

@@ -159,16 +159,16 @@ pub(crate) struct LivePress {
     pub at_mm: [f64; 2],
 }
 
-/// What a run has felt, in a [`RunSnapshot`].
+/// Touches of a run, in a [`RunSnapshot`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LiveTouch {
     /// Whether a touch is being felt.
     pub touching: bool,
-    /// The newest estimate or reaction,
+    /// The newest estimate or reaction.
     pub kind: TouchKind,
-    /// when the run had it, s of rig time,
+    /// When the run received it, s of rig time.
     pub t_s: f64,
-    /// and how long after the newest events in it, ms.
+    /// Age of its newest events at that time, ms.
     pub lag_ms: f64,
     /// Its position, skin frame, mm.
     pub at_mm: Option<[f64; 2]>,

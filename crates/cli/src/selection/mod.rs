@@ -28,7 +28,7 @@ pub struct SelectedPresses {
 }
 
 impl SelectedPresses {
-    /// Names results: the beginning of the selection's hash tells selections with one name apart.
+    /// Part of the names of results: begins with the selection's hash, because two selections may have the same name.
     pub(crate) fn label(&self) -> String {
         let hash = &self.name.sha256;
         format!("selection-{}", hash.get(..16).unwrap_or(hash))
@@ -159,7 +159,7 @@ fn look_up(folder: &Path, file: &str) -> Result<SessionFacts, SessionFault> {
     facts(&path).map_err(|e| SessionFault::Unreadable(e.to_string()))
 }
 
-/// What a selection states about a session.
+/// Facts of a session that a selection checks.
 fn facts(path: &Path) -> Result<SessionFacts, RecorderError> {
     let reader = SessionReader::open(path)?;
     let seal = reader.seal()?;

@@ -13,7 +13,7 @@ use crate::exit::Failure;
 use crate::results::{Results, analyze_shown};
 use crate::selection::SelectedPresses;
 
-/// What a selection changes in a session.
+/// Effect of a selection on a session.
 pub(crate) struct SelectedResult {
     pub name: SelectionName,
     session: PathBuf,

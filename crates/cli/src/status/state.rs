@@ -27,7 +27,7 @@ pub(super) struct Status {
     pub stored: Option<Stored>,
 }
 
-/// What the session file says.
+/// Contents of the session file.
 #[derive(Serialize)]
 pub(super) struct Stored {
     pub id: String,

@@ -44,7 +44,7 @@ fn state(status: &Status) -> String {
     }
 }
 
-/// What continues a session that no program runs and that is not completed.
+/// Command that continues an incomplete session that no program writes.
 fn next_step(status: &Status) -> Option<String> {
     let stored = status.stored.as_ref();
     let end = stored.and_then(|s| s.end.0.as_ref());

@@ -94,7 +94,7 @@ fn state(frame: &Frame, canvas: Canvas) -> Vec<String> {
     lines
 }
 
-/// What the operator should look at.
+/// Problems for the operator.
 fn attention(frame: &Frame, canvas: Canvas) -> Vec<String> {
     let mut lines = Vec::new();
     let last = frame

@@ -1,4 +1,4 @@
-//! What fails during a run: attempts by cause, failures in a row, lost camera bytes.
+//! Failures during a run: attempts by cause, failures in a row, lost camera bytes.
 
 use serde::Serialize;
 use skinrig_model::{CameraId, HostTime, PlannedPress, PressFaultKind, PressOutcome, PressVerdict};

@@ -111,7 +111,7 @@ impl SkinPresses {
     }
 }
 
-/// What locates the scored presses best.
+/// Geometry and field that locate the scored presses best.
 struct RefittedGeometry {
     geometry: StereoGeometry,
     /// Correction factor for errors of the presses that the geometry was fitted to.

@@ -9,7 +9,7 @@ use crate::open_press::OpenPress;
 use crate::touch_sense::{SenseAnswer, SensedTouch};
 
 impl Executor<'_> {
-    /// Learning is due. A leg that starts in the middle of the plan has no such step.
+    /// Starts to learn. The plan of a leg that starts in the middle has no such step.
     pub(super) fn begin_learning(&mut self) -> Result<(), RunFault> {
         if !self.feeling.sense.is_on() {
             let text = "touches are not felt: only a run from the first press on can learn to";
@@ -20,7 +20,7 @@ impl Executor<'_> {
         self.take_answers()
     }
 
-    /// Says at the start of a leg if nothing will be felt in it although the plan wants it.
+    /// Adds a note at the start of a leg that cannot feel touches although the plan asks for it.
     pub(super) fn note_without_sense(&mut self) -> Result<(), RunFault> {
         let mut steps = self.plan.steps.iter();
         if self.plan.online.is_none() || steps.any(|step| matches!(step, Step::Learn)) {

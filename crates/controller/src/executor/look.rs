@@ -47,7 +47,7 @@ impl Executor<'_> {
         })
     }
 
-    /// Why a run that stopped between two presses did so.
+    /// Reason for a stop between two presses.
     pub(super) fn stop_reason(&self) -> StopReason {
         match self.decided {
             Some(look) => StopReason::Decided(Box::new(look)),

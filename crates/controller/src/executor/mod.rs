@@ -170,7 +170,7 @@ impl<'a> Executor<'a> {
         self.send_marks()
     }
 
-    /// Hands the newest bytes of both cameras to a sink that looks at them.
+    /// Passes the newest bytes of both cameras to the sink, if it asks for them.
     fn show_newest(&mut self) {
         let Some(most) = self.journal.wants_newest() else {
             return;

@@ -150,7 +150,7 @@ fn head(input: &ReportInput<'_>) -> Section {
         .with(Note::new("run", end))
 }
 
-/// What must be read before any number: violations, findings of the audit, warnings.
+/// Must be read before any number: violations, findings of the audit, warnings.
 fn problems(a: &Analysis) -> Section {
     let violations = match a.alignment.is_usable() {
         true => &[][..],

@@ -19,7 +19,7 @@ pub(super) struct Output {
     late: Vec<PixelEvent>,
 }
 
-/// What was read in the last microsecond with events.
+/// Rows and events read in the last microsecond with events.
 #[derive(Debug, Clone)]
 struct Arbiter {
     limits: Readout,

@@ -22,7 +22,7 @@ const RESAMPLES: u32 = 200;
 #[cfg(target_os = "linux")]
 const NICE: i32 = 10;
 
-/// The newest analysis, and the round that is under way.
+/// The newest analysis, and the running round.
 pub(super) struct Estimates {
     path: PathBuf,
     stop: Arc<AtomicBool>,
@@ -53,7 +53,7 @@ impl Estimates {
             .clone()
     }
 
-    /// Begins a round if there are new outcomes, no round is under way, and the rest is over.
+    /// Begins a round if there are new outcomes, no round is running, and the rest is over.
     pub(super) fn renew(&mut self, outcomes: usize) {
         if let Some(round) = self.round.take_if(|round| round.is_finished()) {
             let took = round.join().unwrap_or_default();

@@ -37,7 +37,7 @@ impl SealTimer {
     }
 }
 
-/// Follows the session at `path` until nobody writes or watches it any more; `leave` forgets it.
+/// Follows the session at `path` until it has neither writer nor viewers; `leave` forgets it.
 pub(super) fn follow(
     leave: impl Fn(&Path, bool) -> bool,
     lab: &Arc<dyn Lab>,

@@ -35,7 +35,7 @@ const MOST_FOLLOWED: usize = 16;
 pub(crate) struct Hub(Arc<Mutex<BTreeMap<PathBuf, Arc<Sender>>>>);
 
 impl Hub {
-    /// Stream of the session at `path`; starts to follow it if nobody does yet.
+    /// Stream of the session at `path`; starts its follower if there is none yet.
     pub(crate) fn stream(&self, lab: &Arc<dyn Lab>, path: &Path) -> Result<Response, Problem> {
         let mut followed = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let receiver = match followed.get(path) {

@@ -13,9 +13,9 @@ use super::parts::{Sender, publish};
 use super::picture;
 use crate::lab::Lab;
 
-/// Between two questions to the run.
+/// Interval between requests to the run.
 const LOOK: Duration = Duration::from_millis(50);
-/// Between two questions to a run that does not answer, and two looks at whether somebody watches.
+/// The same for a run that does not answer, and interval between checks for viewers.
 const IDLE: Duration = Duration::from_millis(200);
 
 /// State shared with the follower of the file.

@@ -17,7 +17,7 @@ use crate::folder::name_of;
 /// Newest pose samples are looked for this far back, ns.
 const POSES_NS: i64 = 2_000_000_000;
 
-/// What never changes, read once.
+/// Constant data, read once.
 struct FixedData {
     formats: [StreamFormat; 2],
     nominal: StereoGeometry,
@@ -83,8 +83,7 @@ impl SessionSnapshot {
             .count()
     }
 
-    /// Publishes what is new in the file; does not open one that has not changed.
-    /// Without `has_pictures`, nobody else publishes pictures.
+    /// Publishes new data of the file; does not open an unchanged one. `has_pictures`: the run itself publishes pictures.
     pub(super) fn refresh(
         &mut self,
         analysis: Option<&Analysis>,

@@ -23,7 +23,7 @@ const LEFT_OUT: usize = 12;
 /// Readings of a press: one column per camera.
 const READINGS: f64 = 2.0;
 
-/// What the earlier calibration expects of a press.
+/// Readings of a press expected by the earlier calibration.
 pub(super) struct Expectation<'a> {
     pub geometry: &'a StereoGeometry,
     pub centre: [f64; 2],
@@ -36,7 +36,7 @@ pub(super) struct Expectation<'a> {
     pub presses: &'a [CalibrationPress],
     /// Factor on all variances that the earlier held-out presses require.
     pub size: f64,
-    /// Covariance of the earlier parameters, which counts where a field knows nothing.
+    /// Covariance of the earlier parameters, used where a field has no data.
     pub open: Option<DMatrix<f64>>,
 }
 

@@ -40,7 +40,7 @@ pub(super) enum Message<'a> {
     },
 }
 
-/// What one camera says about a press.
+/// Features of a press in one camera.
 #[derive(Debug, Serialize)]
 pub(super) struct CameraLine {
     column_px: Option<f64>,

@@ -38,7 +38,7 @@ pub trait Guest {
     /// No more lines will be sent: waits for the guest's end.
     ///
     /// # Errors
-    /// [`GuestError`] if it says more, or does not end well within this time.
+    /// [`GuestError`] if it sends more lines, or does not end successfully within this time.
     fn end(&mut self, within: Duration) -> Result<(), GuestError>;
 }
 
@@ -167,7 +167,7 @@ struct Sitting<'a, 'e, G> {
     timeouts: Timeouts,
 }
 
-/// What a guest said.
+/// Answers of a guest.
 struct Heard {
     about: Introduction,
     fit_s: f64,
@@ -250,7 +250,7 @@ fn line(message: &Message<'_>) -> String {
     serde_json::to_string(message).unwrap_or_default()
 }
 
-/// What the analysis says about a press; nothing for an excluded one.
+/// Result of the analysis for a press; empty for an excluded one.
 fn own_position(press: &Press<'_>) -> Option<Position> {
     let at = press.row.location_outcome.estimate()?;
     let valid = press.row.verdict == Verdict::Valid;
