@@ -19,6 +19,7 @@ mod model;
 mod patterns;
 mod position;
 mod regions;
+mod run_estimator;
 mod score;
 mod settling;
 mod skin_model;
@@ -27,7 +28,6 @@ mod stream;
 mod threshold;
 mod touch;
 mod training;
-mod under_way;
 mod worker;
 
 pub use clock::SLOT_US;

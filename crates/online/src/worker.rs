@@ -7,9 +7,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use skinrig_model::{CameraId, StreamFormat};
 
+use crate::run_estimator::RunEstimator;
 use crate::skin_model::SkinModel;
 use crate::stream::{CameraLeads, Estimate, StreamError};
-use crate::under_way::UnderWay;
 
 /// Bytes that wait for the thread before further ones are skipped: 0.5 s of two cameras at 1 Mev/s.
 const MOST_QUEUED: usize = 4 << 20;
@@ -44,12 +44,12 @@ enum Job {
 
 /// Does the work.
 struct Core {
-    under_way: UnderWay,
+    estimator: RunEstimator,
 }
 
 impl Core {
     fn bytes(&mut self, camera: CameraId, lost: u64, bytes: &[u8], mut each: impl FnMut(News)) {
-        let fed = self.under_way.feed(camera, lost, bytes, |skin, estimate| {
+        let fed = self.estimator.feed(camera, lost, bytes, |skin, estimate| {
             let at_us = match estimate {
                 Estimate::Felt(d) => d.host_us,
                 Estimate::Position { host_us, .. } => host_us,
@@ -62,16 +62,16 @@ impl Core {
     }
 
     fn skip(&mut self, bytes: [u64; 2], mut each: impl FnMut(News)) {
-        if let Some(until_us) = self.under_way.reached_us() {
+        if let Some(until_us) = self.estimator.reached_us() {
             each(News::Skipped { until_us });
         }
-        if let Err(e) = self.under_way.skip(bytes) {
+        if let Err(e) = self.estimator.skip(bytes) {
             each(News::Failed(e));
         }
     }
 
     fn start(&mut self, skin: SkinModel) -> News {
-        match self.under_way.start(skin) {
+        match self.estimator.start(skin) {
             Ok(()) => News::Started,
             Err(e) => News::Failed(e),
         }
@@ -93,9 +93,9 @@ impl Worker {
     /// Works where the bytes arrive: for rigs whose time stands still meanwhile. Positions of a touch come every so many µs.
     #[must_use]
     pub fn here(formats: [StreamFormat; 2], every_us: i64) -> Self {
-        let under_way = UnderWay::new(formats, every_us);
+        let estimator = RunEstimator::new(formats, every_us);
         Self(Place::Here {
-            core: Box::new(Core { under_way }),
+            core: Box::new(Core { estimator }),
             news: VecDeque::new(),
         })
     }
@@ -105,7 +105,8 @@ impl Worker {
     /// # Errors
     /// If the system starts no thread.
     pub fn on_a_thread(formats: [StreamFormat; 2], every_us: i64) -> std::io::Result<Self> {
-        Thread::start(UnderWay::new(formats, every_us)).map(|thread| Self(Place::Thread(thread)))
+        Thread::start(RunEstimator::new(formats, every_us))
+            .map(|thread| Self(Place::Thread(thread)))
     }
 
     /// Feels from the bytes that follow.
@@ -143,14 +144,14 @@ struct Thread {
 }
 
 impl Thread {
-    fn start(under_way: UnderWay) -> std::io::Result<Self> {
+    fn start(estimator: RunEstimator) -> std::io::Result<Self> {
         let (jobs, todo) = channel();
-        let (say, news) = channel();
+        let (to, news) = channel();
         let queued = Arc::new(AtomicUsize::new(0));
         let waiting = Arc::clone(&queued);
         std::thread::Builder::new()
             .name("touch".to_owned())
-            .spawn(move || work(Core { under_way }, &todo, &say, &waiting))?;
+            .spawn(move || work(Core { estimator }, &todo, &to, &waiting))?;
         Ok(Self {
             jobs,
             news,
@@ -189,10 +190,10 @@ impl Thread {
     }
 }
 
-fn work(mut core: Core, jobs: &Receiver<Job>, say: &Sender<News>, queued: &AtomicUsize) {
+fn work(mut core: Core, jobs: &Receiver<Job>, to: &Sender<News>, queued: &AtomicUsize) {
     for job in jobs {
         // Fails only if the receiver is gone.
-        let each = |news| drop(say.send(news));
+        let each = |news| drop(to.send(news));
         match job {
             Job::Bytes {
                 camera,
@@ -214,7 +215,7 @@ mod tests {
 
     /// Bytes that do not fit are skipped until the queue is empty; they are counted, and reported before the bytes that follow.
     #[test]
-    fn a_full_queue_skips_and_says_so() {
+    fn a_full_queue_skips_and_reports_it() {
         let (jobs, todo) = channel();
         let (_, news) = channel();
         let queued = Arc::new(AtomicUsize::new(0));

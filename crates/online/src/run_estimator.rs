@@ -1,4 +1,4 @@
-//! The estimator of a recording that is under way: it decodes from the start, and feels once it has learnt.
+//! The estimator of a running recording: it decodes from the start, and feels touches once it has learnt a skin.
 
 use skinrig_model::{CameraId, StreamFormat};
 
@@ -7,24 +7,24 @@ use crate::skin_model::SkinModel;
 use crate::stream::{CameraLeads, Estimate, StreamError, StreamSettings};
 
 /// Bytes of both cameras in, estimates out.
-pub(crate) struct UnderWay {
+pub(crate) struct RunEstimator {
     state: State,
     every_us: i64,
 }
 
 enum State {
-    /// Nothing is learnt: only the time of the streams is followed.
-    Ignorant(Box<Decoders>),
+    /// No skin is learnt yet: only the time of the streams is followed.
+    Decoding(Box<Decoders>),
     Feeling(Box<(Live, SkinModel)>),
     /// A step failed.
-    Gone,
+    Failed,
 }
 
-impl UnderWay {
+impl RunEstimator {
     /// For cameras that send these formats; positions of a touch come every so many µs of host time.
     pub(crate) fn new(formats: [StreamFormat; 2], every_us: i64) -> Self {
         Self {
-            state: State::Ignorant(Box::new(Decoders::new(formats))),
+            state: State::Decoding(Box::new(Decoders::new(formats))),
             every_us,
         }
     }
@@ -34,10 +34,10 @@ impl UnderWay {
     /// # Errors
     /// [`StreamError`]; then nothing is felt.
     pub(crate) fn start(&mut self, skin: SkinModel) -> Result<(), StreamError> {
-        let decoders = match std::mem::replace(&mut self.state, State::Gone) {
-            State::Ignorant(decoders) => decoders,
+        let decoders = match std::mem::replace(&mut self.state, State::Failed) {
+            State::Decoding(decoders) => decoders,
             State::Feeling(both) => Box::new(both.0.into_decoders()),
-            State::Gone => return Ok(()),
+            State::Failed => return Ok(()),
         };
         let host_us = |camera: CameraId| {
             let newest_us = decoders.newest_us(camera).unwrap_or(0);
@@ -64,8 +64,8 @@ impl UnderWay {
         mut each: impl FnMut(&SkinModel, Estimate),
     ) -> Result<(), CameraLeads> {
         match &mut self.state {
-            State::Gone => Ok(()),
-            State::Ignorant(decoders) => {
+            State::Failed => Ok(()),
+            State::Decoding(decoders) => {
                 if lost > 0 {
                     decoders.lost(camera, lost);
                 }
@@ -90,14 +90,14 @@ impl UnderWay {
         for camera in CameraId::ALL {
             let lost = bytes[camera.index()];
             match &mut self.state {
-                State::Ignorant(decoders) if lost > 0 => decoders.lost(camera, lost),
+                State::Decoding(decoders) if lost > 0 => decoders.lost(camera, lost),
                 State::Feeling(both) if lost > 0 => both.0.lost(camera, lost),
                 _ => {}
             }
         }
         match &self.state {
             State::Feeling(both) => self.start(both.1.clone()),
-            State::Ignorant(_) | State::Gone => Ok(()),
+            State::Decoding(_) | State::Failed => Ok(()),
         }
     }
 
@@ -105,7 +105,7 @@ impl UnderWay {
     pub(crate) fn reached_us(&self) -> Option<i64> {
         match &self.state {
             State::Feeling(both) => Some(both.0.detector().now_us()),
-            State::Ignorant(_) | State::Gone => None,
+            State::Decoding(_) | State::Failed => None,
         }
     }
 }
