@@ -2,40 +2,30 @@
 
 use skinrig_model::CameraId;
 
-use crate::accumulate::{Accumulator, PassOutput, PassRequest, SLACK_US, pass, rate_bin_us};
 use crate::audit::Streams;
 use crate::calibrate::SessionCalibration;
 use crate::camera_clocks::{CameraClock, CameraClocks};
-use crate::closeups::{Closeups, keep_plans, zoom_plans};
+use crate::camera_pass::{CameraResult, camera_pass};
+use crate::closeups::Closeups;
 use crate::error::AnalysisError;
-use crate::event_cache::EventCache;
-use crate::hot_pixels::{HotPixelMask, PixelCounts};
-use crate::indentation::{self, PressPhases, phase_plans};
+use crate::indentation;
 use crate::input::{EventSource, SessionInput};
 use crate::locate_presses::{
-    CalibrationOrigin, CameraObservations, LocatedPresses, locate_presses, locate_recalibrated,
+    CalibrationOrigin, LocatedPresses, locate_presses, locate_recalibrated,
 };
 use crate::locator::{EarlierCalibration, Effort, FittedLocator, LocatorModelError};
 use crate::metrics::{Exclusions, metrics, penalised};
-use crate::onsets::{Onset, onsets};
 use crate::press_event_collector::RetentionPlan;
 use crate::press_events::{RetainedPress, RetainedPresses, Retention};
-use crate::press_spans::{spans, timings};
-use crate::rates::RateHistogram;
+use crate::press_spans::spans;
 use crate::result::{
-    ANALYSIS_VERSION, Activity, Alignment, AlignmentStatus, AlignmentViolation, Analysis, ClockFit,
-    ClockMap, ContactTiming, DepthResult, HotPixels, MapName, OffSensor, PressPicture, PressResult,
-    PressView, RateSeries, RateZoom, RatesEvidence, Warning, WarningCause,
+    ANALYSIS_VERSION, Alignment, AlignmentStatus, AlignmentViolation, Analysis, ClockFit, ClockMap,
+    ContactTiming, DepthResult, MapName, Metrics, PenalisedRmse, PressResult, RatesEvidence,
+    Warning, WarningCause,
 };
-use crate::segment::{Window, windows};
 use crate::session_base::time_base;
 use crate::sets::ScoreSet;
-use crate::stream::{Silences, contacts_s};
-use crate::tie::UntimedPress;
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
-
-/// Windows that overlap by less than this only touch, because their ends are rounded, µs.
-const OVERLAP_US: u64 = 100;
 
 /// Analyses a session. The first pass over a camera's events finds event rates and, where its clock is known before, hot pixels; the
 /// last one fills the press windows. Both cameras run in parallel. Later passes use cached events of the crop. Each reads
@@ -95,18 +85,7 @@ fn analyze_by(
         evidence,
         violations,
     } = CameraClocks::new(input, source, base.as_ref())?;
-    let [one, two] = std::thread::scope(|scope| {
-        let plan = &plan;
-        let second =
-            scope.spawn(move || camera_pass(input, source, CameraId::Two, plan, reading_two));
-        let first = camera_pass(input, source, CameraId::One, plan, reading_one);
-        let second = match second.join() {
-            Ok(result) => result,
-            Err(panic) => std::panic::resume_unwind(panic),
-        };
-        [first, second]
-    });
-    let cameras = [one?, two?];
+    let cameras = both_cameras(input, source, &plan, [reading_one, reading_two])?;
     let mut warnings: Vec<Warning> = Vec::new();
     let observations = [cameras[0].observations(), cameras[1].observations()];
     let (located, recalibration) = match origin {
@@ -137,37 +116,12 @@ fn analyze_by(
         [&cameras[0].phases, &cameras[1].phases],
     );
     let scores = ScoreSet::from_presses(&presses, &input.outcomes);
-    let measure = |set: &ScoreSet, exclusions| {
-        metrics(
-            set,
-            exclusions,
-            &input.rig.outline,
-            input.settings.within_mm,
-            input.settings.bootstrap_resamples,
-            input.settings.seed,
-        )
-    };
-    let scored = measure(&scores, Exclusions::Applied);
-    let scored_without_exclusions = if scores.excludes_estimates() {
-        measure(&scores, Exclusions::Ignored)
-    } else {
-        scored
-    };
-    let penalised = penalised(
-        &scores,
-        input.settings.failure_penalty_mm,
-        input.settings.bootstrap_resamples,
-        input.settings.seed,
-    );
-    let depths = scores.depths_mm();
-    let mut depths = if depths.len() > 1 { depths } else { Vec::new() };
-    let unreached = input.unreached_depths_mm();
-    depths.retain(|depth_mm| !unreached.contains(depth_mm));
-    let depths = depths.into_iter().map(|depth_mm| DepthResult {
-        depth_mm,
-        rmse_mm: measure(&scores.at_depth(depth_mm), Exclusions::Applied).rmse_mm,
-    });
-    let depths = depths.collect();
+    let Scores {
+        scored,
+        scored_without_exclusions,
+        penalised,
+        depths,
+    } = Scores::of(input, &scores);
     let both = [&scored.rmse_mm, &scored_without_exclusions.rmse_mm];
     warnings.extend(verdict::exclusion_warning(&presses, both));
     warnings.extend(verdict::nothing_counts(&presses));
@@ -246,6 +200,74 @@ fn analyze_by(
     Ok((analysis, kept))
 }
 
+/// [`camera_pass`] of both cameras, in parallel.
+fn both_cameras(
+    input: &SessionInput,
+    source: &dyn EventSource,
+    plan: &Closeups,
+    [one, two]: [CameraClock; 2],
+) -> Result<[CameraResult; 2], AnalysisError> {
+    let (first, second) = std::thread::scope(|scope| {
+        let second = scope.spawn(move || camera_pass(input, source, CameraId::Two, plan, two));
+        let first = camera_pass(input, source, CameraId::One, plan, one);
+        let second = match second.join() {
+            Ok(result) => result,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        (first, second)
+    });
+    Ok([first?, second?])
+}
+
+/// Errors of the scored presses.
+struct Scores {
+    scored: Metrics,
+    /// As if no estimate were excluded.
+    scored_without_exclusions: Metrics,
+    penalised: PenalisedRmse,
+    /// Empty unless the plan has several depths.
+    depths: Vec<DepthResult>,
+}
+
+impl Scores {
+    fn of(input: &SessionInput, set: &ScoreSet) -> Self {
+        let settings = &input.settings;
+        let (resamples, seed) = (settings.bootstrap_resamples, settings.seed);
+        let measure = |set: &ScoreSet, exclusions| {
+            metrics(
+                set,
+                exclusions,
+                &input.rig.outline,
+                settings.within_mm,
+                resamples,
+                seed,
+            )
+        };
+        let scored = measure(set, Exclusions::Applied);
+        let scored_without_exclusions = if set.excludes_estimates() {
+            measure(set, Exclusions::Ignored)
+        } else {
+            scored
+        };
+        let mut depths = set.depths_mm();
+        if depths.len() < 2 {
+            depths.clear();
+        }
+        let unreached = input.unreached_depths_mm();
+        depths.retain(|depth_mm| !unreached.contains(depth_mm));
+        let depths = depths.into_iter().map(|depth_mm| DepthResult {
+            depth_mm,
+            rmse_mm: measure(&set.at_depth(depth_mm), Exclusions::Applied).rmse_mm,
+        });
+        Self {
+            scored,
+            scored_without_exclusions,
+            penalised: penalised(set, settings.failure_penalty_mm, resamples, seed),
+            depths: depths.collect(),
+        }
+    }
+}
+
 /// Alignment without trigger box reports: what can be stated.
 fn uncertified(clocks: [Option<ClockFit>; 2]) -> Alignment {
     let names = [MapName::Camera1FromHost, MapName::Camera2FromHost];
@@ -316,39 +338,6 @@ fn evaluate(
     Ok(())
 }
 
-/// Results of one camera.
-struct CameraResult {
-    clock: Option<ClockFit>,
-    rates: RateSeries,
-    /// One entry per row of the plan.
-    views: Vec<Option<PressView>>,
-    data_lost: Vec<bool>,
-    untimed: Vec<Option<UntimedPress>>,
-    silences: Silences,
-    /// Contacts detected in the counts, s on the host clock, if the presses come from a schedule.
-    contacts_s: Vec<f64>,
-    onsets: Vec<Onset>,
-    pictures: Vec<PressPicture>,
-    zooms: Vec<RateZoom>,
-    kept: Vec<RetentionPlan>,
-    phases: Vec<PressPhases>,
-    activity: Option<Activity>,
-    off_sensor: OffSensor,
-    hot_pixels: HotPixels,
-    warnings: Vec<Warning>,
-}
-
-impl CameraResult {
-    fn observations(&self) -> CameraObservations<'_> {
-        CameraObservations {
-            has_clock: self.clock.is_some(),
-            views: &self.views,
-            data_lost: &self.data_lost,
-            untimed: &self.untimed,
-        }
-    }
-}
-
 /// Views of both cameras per press; drops a press that one camera lacks.
 fn paired(
     presses: &[PressResult],
@@ -376,207 +365,4 @@ fn paired(
         left_out: (plan.kept.len() - presses.len()) as u32,
         presses,
     }
-}
-
-/// Events of a camera, from the cache of the first pass if it holds them.
-struct Events<'a> {
-    source: &'a dyn EventSource,
-    camera: CameraId,
-    cache: Option<&'a EventCache>,
-}
-
-impl Events<'_> {
-    fn pass(&self, mut accumulator: Accumulator<'_>) -> Result<PassOutput, AnalysisError> {
-        match self.cache {
-            Some(cache) => {
-                accumulator.take_cached(cache);
-                accumulator.finish()
-            }
-            None => pass(self.source, self.camera, accumulator),
-        }
-    }
-
-    fn count(&self, mut pixels: PixelCounts) -> Result<PixelCounts, AnalysisError> {
-        let camera = self.camera;
-        match self.cache {
-            Some(cache) => cache.for_each_slice(|events| pixels.add(events)),
-            None => self
-                .source
-                .for_each_slice(camera, &mut |events| pixels.add(events))
-                .map_err(|source| AnalysisError::Events { camera, source })?,
-        }
-        Ok(pixels)
-    }
-}
-
-fn camera_pass(
-    input: &SessionInput,
-    source: &dyn EventSource,
-    camera: CameraId,
-    plan: &Closeups,
-    reading: CameraClock,
-) -> Result<CameraResult, AnalysisError> {
-    let settings = &input.settings;
-    let k = camera.index();
-    let CameraClock {
-        clock,
-        rates,
-        activity,
-        cache,
-        pixels,
-        untimed,
-        off_sensor,
-        mut warnings,
-    } = reading;
-    let list = clock.map_or_else(Vec::new, |c| {
-        windows(timings(input), &input.earlier, &c, settings)
-    });
-    let events = Events {
-        source,
-        camera,
-        cache: cache.as_ref(),
-    };
-    let mut hot_pixels = HotPixels::default();
-    let mut collected = PassOutput::default();
-    // Without a clock, the events contain nothing more.
-    if let Some(clock) = clock {
-        let pixels = match pixels {
-            Some(pixels) => pixels,
-            None => events.count(PixelCounts::new(settings.crop_v[k], &list))?,
-        };
-        hot_pixels = pixels.hot(settings);
-        // Where only hot pixels fire, the camera is silent.
-        let any_hot = !hot_pixels.pixels.is_empty();
-        let wanted = PassRequest {
-            rates: any_hot.then(|| RateHistogram::new(rate_bin_us(settings))),
-            windows: &list,
-            pictured: &plan.pictures,
-            zooms: zoom_plans(input, plan, &clock),
-            kept: keep_plans(input, plan, &list, &clock),
-            phases: phase_plans(input, &list, &clock),
-            hot: HotPixelMask::new(&hot_pixels),
-            ..PassRequest::default()
-        };
-        collected = events.pass(Accumulator::new(camera, settings, wanted))?;
-    }
-    collected = PassOutput {
-        rates: collected.rates.take().or(rates),
-        activity,
-        off_sensor,
-        ..collected
-    };
-    if !hot_pixels.pixels.is_empty() {
-        warnings.push(WarningCause::HotPixels {
-            pixels: hot_pixels.pixels.len() as u32,
-            of: hot_pixels.of,
-            highest_per_s: hot_pixels.highest_per_s,
-            idle_share: hot_pixels.idle_share,
-        });
-    }
-    if list
-        .windows(2)
-        .any(|w| w[1].start_us + OVERLAP_US < w[0].end_us)
-    {
-        warnings.push(WarningCause::WindowsOverlap);
-    }
-    if collected.late > 0 {
-        warnings.push(WarningCause::EventsOutOfOrder {
-            events: collected.late,
-            limit_ms: SLACK_US / 1000,
-        });
-    }
-    if let Some(events) = collected
-        .rates
-        .as_ref()
-        .map(RateHistogram::beyond)
-        .filter(|b| *b > 0)
-    {
-        warnings.push(WarningCause::EventsDaysAway { events });
-    }
-    let off_sensor = collected.off_sensor;
-    if off_sensor.share() > OffSensor::MAX_SHARE {
-        let OffSensor { events, of } = off_sensor;
-        return Err(AnalysisError::OffSensor { camera, events, of });
-    }
-    if off_sensor.share() > OffSensor::WARNING_SHARE {
-        let OffSensor { events, of } = off_sensor;
-        warnings.push(WarningCause::EventsOffSensor { events, of });
-    }
-    let (silences, contacts_s) = stream(input, &collected, clock.as_ref());
-    let onsets = match (&collected.rates, &clock) {
-        (Some(rates), Some(clock)) => onsets(input, rates, clock),
-        _ => Vec::new(),
-    };
-    let lost = [&input.gaps[k][..], &silences.spans()].concat();
-    let series = collected
-        .rates
-        .map(|r| r.series(clock.as_ref()))
-        .unwrap_or_default();
-    Ok(CameraResult {
-        clock,
-        rates: series,
-        views: by_row(input.planned.len(), collected.views),
-        data_lost: lost_rows(input.planned.len(), &list, &lost),
-        silences,
-        contacts_s,
-        onsets,
-        untimed,
-        pictures: collected.pictures,
-        zooms: collected.zooms,
-        kept: collected.kept,
-        phases: collected.phases,
-        activity: collected.activity,
-        off_sensor,
-        hot_pixels,
-        warnings: warnings
-            .into_iter()
-            .map(|cause| Warning::of_camera(camera, cause))
-            .collect(),
-    })
-}
-
-/// Results from the counts of a camera alone.
-fn stream(
-    input: &SessionInput,
-    collected: &PassOutput,
-    clock: Option<&ClockFit>,
-) -> (Silences, Vec<f64>) {
-    let (Some(rates), Some(clock)) = (&collected.rates, clock) else {
-        return (Silences::default(), Vec::new());
-    };
-    let pressed = spans(input);
-    let (Some(first), Some(last)) = (pressed.first(), pressed.last()) else {
-        return (Silences::default(), Vec::new());
-    };
-    let ends = (
-        clock.camera_us(first.contact_us),
-        clock.camera_us(last.release_us),
-    );
-    let views = collected.views.iter().map(|(_, view)| *view);
-    let silences = Silences::new(rates, views, ends);
-    // The clock of a camera is that of one leg.
-    let contacts_s = if input.legs.is_empty() {
-        let listed = pressed.iter();
-        let listed = listed.map(|s| (s.contact_us * 1e-6, s.release_us * 1e-6));
-        contacts_s(rates, clock, &listed.collect::<Vec<_>>())
-    } else {
-        Vec::new()
-    };
-    (silences, contacts_s)
-}
-
-pub(crate) fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>> {
-    let mut out = vec![None; rows];
-    for (row, view) in views {
-        out[row] = Some(view);
-    }
-    out
-}
-
-pub(crate) fn lost_rows(rows: usize, windows: &[Window], gaps: &[(u64, u64)]) -> Vec<bool> {
-    let mut out = vec![false; rows];
-    for window in windows.iter().filter(|w| w.overlaps(gaps)) {
-        out[window.row] = true;
-    }
-    out
 }

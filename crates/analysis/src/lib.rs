@@ -16,6 +16,7 @@ pub mod background;
 pub mod bit_rates;
 pub mod calibrate;
 mod camera_clocks;
+mod camera_pass;
 mod caveats;
 pub mod check;
 pub mod clock;

@@ -4,7 +4,7 @@ use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, SkinOut
 
 use super::choice::Region;
 use super::winner::PressErrors;
-use crate::analyze::{by_row, lost_rows};
+use crate::camera_pass::{by_row, lost_rows};
 use crate::estimators::{PressEstimator, Thinning};
 use crate::input::SessionInput;
 use crate::locate_presses::{CameraObservations, LocatedPresses, locate_presses};
