@@ -4,8 +4,8 @@ use skinrig_device::{IndenterCapabilities, MotionLimits};
 use skinrig_model::{
     Point2, Point3, PressHistory, PressId, RigidTransform, Robot, RunFault, RunHeader, Skin,
 };
-use skinrig_protocol::plan::{Plan, PressStep, Step};
-use skinrig_protocol::{Surface, TouchSearch};
+use skinrig_protocol::plan::{Plan, PressStep, RunLimits, Step};
+use skinrig_protocol::{Surface, SurfaceCheck, TouchSearch};
 
 use crate::guard::check_target;
 
@@ -39,23 +39,7 @@ pub(crate) fn check_plan(
             format!("{} different presses", header.presses.len()),
         ));
     }
-    let limits = &plan.limits;
-    let positive = [
-        ("max_speed_mm_s", limits.max_speed_mm_s),
-        ("max_force_n", limits.max_force_n),
-        ("max_depth_mm", limits.max_depth_mm),
-        ("clearance_mm", limits.clearance_mm),
-        ("position_tolerance_mm", limits.position_tolerance_mm),
-    ];
-    for (name, value) in positive {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(plan_error(
-                format!("limits.{name}"),
-                "a finite number above 0",
-                value.to_string(),
-            ));
-        }
-    }
+    check_limits(&plan.limits)?;
     for (i, press) in plan.presses.iter().enumerate() {
         if press.id.index() as usize != i {
             let found = press.id.to_string();
@@ -74,101 +58,160 @@ pub(crate) fn check_plan(
             ));
         }
     };
-    let mut has_step = vec![false; plan.presses.len()];
-    let mut above: Option<Point3<Skin>> = None;
+    let mut steps = StepChecks::new(plan);
     for (n, step) in (1..).zip(&plan.steps) {
-        let place = |what: &str| format!("step {n}, {what}");
-        match step {
-            Step::Begin { .. } | Step::Look { .. } | Step::Learn => {}
-            Step::Pause { duration } => {
-                if duration.0 < 0 {
-                    let found = duration.to_string();
-                    return Err(plan_error(place("pause"), "0 s or more", found));
-                }
-            }
-            Step::Travel { to, speed_mm_s, .. } => {
-                check_speed(plan, &place("travel"), *speed_mm_s)?;
-                check_point(plan, &place("travel"), *to)?;
-                if to.z_mm < limits.clearance_mm - SAME_PLACE_MM {
-                    return Err(plan_error(
-                        place("travel"),
-                        format!("a height of at least {} mm", limits.clearance_mm),
-                        format!("{} mm", to.z_mm),
-                    ));
-                }
-                above = Some(*to);
-            }
-            Step::Press(press) => {
-                let name = place(&press.press.to_string());
-                match has_step.get_mut(press.press.index() as usize) {
-                    Some(done) if !*done => *done = true,
-                    _ => {
-                        return Err(plan_error(
-                            name,
-                            "each press once",
-                            "a repeated or unknown press",
-                        ));
-                    }
-                }
-                for speed in [
-                    press.approach_speed_mm_s,
-                    press.indent_speed_mm_s,
-                    press.retract_speed_mm_s,
-                ] {
-                    check_speed(plan, &name, speed)?;
-                }
-                if !(press.depth_mm.is_finite() && press.depth_mm > 0.0) {
-                    let found = press.depth_mm.to_string();
-                    return Err(plan_error(name, "a depth above 0 mm", found));
-                }
-                for z_mm in [limits.clearance_mm, 0.0, -press.depth_mm] {
-                    check_point(plan, &name, press.at.at_height(z_mm))?;
-                }
-                if let Surface::Touch(search) = &press.surface {
-                    check_search(plan, &name, press.at, search)?;
-                }
-                let planned = &plan.presses[press.press.index() as usize];
-                if planned.at != press.at || planned.depth_mm != press.depth_mm {
-                    return Err(plan_error(
-                        name,
-                        format!("location and depth of the press list ({planned:?})"),
-                        format!("{:?}, {} mm", press.at, press.depth_mm),
-                    ));
-                }
-                let is_above =
-                    above.is_some_and(|a| a.plane().distance_mm(press.at) <= SAME_PLACE_MM);
-                if !is_above {
-                    return Err(plan_error(
-                        name,
-                        "a travel to above the press first",
-                        above
-                            .map_or_else(|| "none".to_owned(), |a| skinrig_model::fault::point(&a)),
-                    ));
-                }
-                above = Some(press.at.at_height(limits.clearance_mm));
-            }
-        }
+        steps.check(n, step)?;
     }
     if let Some(check) = &plan.surface_check {
-        for at in &check.points {
-            check_point(plan, "surface_check", at.at_height(limits.clearance_mm))?;
-            check_search(plan, "surface_check", *at, &check.search)?;
-        }
-        let (tolerance_mm, band_mm) = (check.tolerance_mm, check.search.band_mm);
-        if check.points.is_empty() || !(tolerance_mm > 0.0 && tolerance_mm < band_mm) {
-            return Err(plan_error(
-                "surface_check",
-                format!("points, and a tolerance above 0 and below {band_mm} mm"),
-                format!("{} points, {tolerance_mm} mm", check.points.len()),
-            ));
-        }
+        check_surface(plan, check)?;
     }
+    let has_step = steps.has_step;
     if let Some(i) = (0..has_step.len()).find(|i| has_step[*i] != pending[*i]) {
-        let step = |is_above: bool| if is_above { "a step" } else { "no step" };
+        let step = |exists: bool| if exists { "a step" } else { "no step" };
         return Err(plan_error(
             "steps",
             format!("{} for {}", step(pending[i]), PressId::from_index(i as u32)),
             step(has_step[i]),
+        ));
+    }
+    Ok(())
+}
+
+fn check_limits(limits: &RunLimits) -> Result<(), RunFault> {
+    let positive = [
+        ("max_speed_mm_s", limits.max_speed_mm_s),
+        ("max_force_n", limits.max_force_n),
+        ("max_depth_mm", limits.max_depth_mm),
+        ("clearance_mm", limits.clearance_mm),
+        ("position_tolerance_mm", limits.position_tolerance_mm),
+    ];
+    let bad = |(_, value): &(&str, f64)| !(value.is_finite() && *value > 0.0);
+    match positive.into_iter().find(bad) {
+        Some((name, value)) => Err(plan_error(
+            format!("limits.{name}"),
+            "a finite number above 0",
+            value.to_string(),
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Checks the steps of a plan in order.
+struct StepChecks<'a> {
+    plan: &'a Plan,
+    /// For each press: whether a step makes it.
+    has_step: Vec<bool>,
+    /// Where the tip is at or above clearance height; `None` before the first travel.
+    above: Option<Point3<Skin>>,
+}
+
+impl<'a> StepChecks<'a> {
+    fn new(plan: &'a Plan) -> Self {
+        Self {
+            plan,
+            has_step: vec![false; plan.presses.len()],
+            above: None,
+        }
+    }
+
+    /// Checks step number `n`.
+    fn check(&mut self, n: u32, step: &Step) -> Result<(), RunFault> {
+        match step {
+            Step::Begin { .. } | Step::Look { .. } | Step::Learn => Ok(()),
+            Step::Pause { duration } if duration.0 < 0 => Err(plan_error(
+                format!("step {n}, pause"),
+                "0 s or more",
+                duration.to_string(),
+            )),
+            Step::Pause { .. } => Ok(()),
+            Step::Travel { to, speed_mm_s, .. } => {
+                self.travel(&format!("step {n}, travel"), *to, *speed_mm_s)
+            }
+            Step::Press(press) => self.press(&format!("step {n}, {}", press.press), press),
+        }
+    }
+
+    fn travel(&mut self, place: &str, to: Point3<Skin>, speed_mm_s: f64) -> Result<(), RunFault> {
+        check_speed(self.plan, place, speed_mm_s)?;
+        check_point(self.plan, place, to)?;
+        let clearance_mm = self.plan.limits.clearance_mm;
+        if to.z_mm < clearance_mm - SAME_PLACE_MM {
+            return Err(plan_error(
+                place,
+                format!("a height of at least {clearance_mm} mm"),
+                format!("{} mm", to.z_mm),
+            ));
+        }
+        self.above = Some(to);
+        Ok(())
+    }
+
+    fn press(&mut self, place: &str, press: &PressStep) -> Result<(), RunFault> {
+        let plan = self.plan;
+        let row = press.press.index() as usize;
+        let planned = match (self.has_step.get_mut(row), plan.presses.get(row)) {
+            (Some(done), Some(planned)) if !*done => {
+                *done = true;
+                planned
+            }
+            _ => {
+                return Err(plan_error(
+                    place,
+                    "each press once",
+                    "a repeated or unknown press",
+                ));
+            }
+        };
+        for speed in [
+            press.approach_speed_mm_s,
+            press.indent_speed_mm_s,
+            press.retract_speed_mm_s,
+        ] {
+            check_speed(plan, place, speed)?;
+        }
+        if !(press.depth_mm.is_finite() && press.depth_mm > 0.0) {
+            let found = press.depth_mm.to_string();
+            return Err(plan_error(place, "a depth above 0 mm", found));
+        }
+        let clearance_mm = plan.limits.clearance_mm;
+        for z_mm in [clearance_mm, 0.0, -press.depth_mm] {
+            check_point(plan, place, press.at.at_height(z_mm))?;
+        }
+        if let Surface::Touch(search) = &press.surface {
+            check_search(plan, place, press.at, search)?;
+        }
+        if planned.at != press.at || planned.depth_mm != press.depth_mm {
+            return Err(plan_error(
+                place,
+                format!("location and depth of the press list ({planned:?})"),
+                format!("{:?}, {} mm", press.at, press.depth_mm),
+            ));
+        }
+        let from = self.above;
+        if !from.is_some_and(|a| a.plane().distance_mm(press.at) <= SAME_PLACE_MM) {
+            return Err(plan_error(
+                place,
+                "a travel to above the press first",
+                from.map_or_else(|| "none".to_owned(), |a| skinrig_model::fault::point(&a)),
+            ));
+        }
+        self.above = Some(press.at.at_height(clearance_mm));
+        Ok(())
+    }
+}
+
+fn check_surface(plan: &Plan, check: &SurfaceCheck) -> Result<(), RunFault> {
+    let place = "surface_check";
+    for at in &check.points {
+        check_point(plan, place, at.at_height(plan.limits.clearance_mm))?;
+        check_search(plan, place, *at, &check.search)?;
+    }
+    let (tolerance_mm, band_mm) = (check.tolerance_mm, check.search.band_mm);
+    if check.points.is_empty() || !(tolerance_mm > 0.0 && tolerance_mm < band_mm) {
+        return Err(plan_error(
+            place,
+            format!("points, and a tolerance above 0 and below {band_mm} mm"),
+            format!("{} points, {tolerance_mm} mm", check.points.len()),
         ));
     }
     Ok(())
