@@ -82,7 +82,7 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
         .iter()
         .filter(|p| derive::is_counted(p))
         .collect();
-    let others: Vec<_> = input
+    let mut others: Vec<_> = input
         .analysis
         .presses
         .iter()
@@ -107,6 +107,47 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
     let place = backdrop(&mut canvas, &layout);
     let place = &place;
     let svg = &mut canvas.svg;
+    fields_of_view(svg, (&layout, place), input);
+    svg.path("skin-edge", &layout.skin(place));
+    press_order(svg, (&layout, place), input);
+    let end = scale_end(locations.iter().map(|l| l.mean_error_mm)).unwrap_or(1.0);
+    discs(
+        svg,
+        (&layout, place),
+        &locations,
+        |l| Some(l.mean_error_mm),
+        end,
+    );
+    region_ellipses(svg, (&layout, place), &regions);
+    error_vectors(svg, (&layout, place), &counted);
+    let has_disc = |p: &PressResult| locations.iter().any(|l| l.location == p.location);
+    others.retain(|p| p.timing.is_some() || !has_disc(p));
+    uncounted_squares(svg, (&layout, place), &others);
+    layout.cameras(svg, place, input);
+    svg.leaf("g", &[("class", &"selection")]);
+    svg.close();
+    canvas.moving(SCALE_TO);
+    let beyond = locations.iter().filter(|l| l.mean_error_mm > end).count();
+    error_scale(&mut canvas.svg, "mean error\n(mm)", end, beyond);
+    canvas.svg.close();
+    canvas.moving(LEGEND_TO);
+    column(&mut canvas.svg, (756.0, 400.0), &LEGEND);
+    canvas.svg.close();
+    if counted.is_empty() {
+        canvas.empty("no scored press was located");
+    }
+    let n = format!(
+        "n = {} presses, {} locations",
+        counted.len(),
+        locations.len()
+    );
+    canvas
+        .finish(&foot(input), &n, "presses")
+        .interactive("select")
+}
+
+/// Fields of view and their overlap, clipped to the skin, and the probed area.
+fn fields_of_view(svg: &mut Markup, (layout, place): (&Layout, &Place), input: &ReportInput<'_>) {
     svg.open(
         "g",
         &[
@@ -142,49 +183,31 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
     }
     svg.close();
     if let Some((coverage, cell_mm)) = coverage.and_then(|c| Some((c, c.cell_mm?))) {
-        cells(svg, (&layout, place), &coverage.places, cell_mm);
+        cells(svg, (layout, place), &coverage.places, cell_mm);
     }
-    svg.path("skin-edge", &layout.skin(place));
-    let first = input
-        .analysis
-        .presses
-        .iter()
-        .filter(|p| p.role != PressRole::Sync)
-        .map(|p| p.repetition)
-        .min();
-    let path = input
-        .analysis
-        .presses
-        .iter()
-        .filter(|p| p.role != PressRole::Sync && Some(p.repetition) == first);
+}
+
+/// Line through the locations in the order of the first repetition.
+fn press_order(svg: &mut Markup, (layout, place): (&Layout, &Place), input: &ReportInput<'_>) {
+    let presses = input.analysis.presses.iter();
+    let presses = presses.filter(|p| p.role != PressRole::Sync);
+    let first = presses.clone().map(|p| p.repetition).min();
+    let path = presses
+        .filter(|p| Some(p.repetition) == first)
+        .map(|p| layout.px(place, p.planned));
     svg.open("g", &[("class", &"layer-path")]);
-    svg.path(
-        "path",
-        &polyline(path.map(|p| layout.px(place, p.planned)), false),
-    );
+    svg.path("path", &polyline(path, false));
     svg.close();
-    let end = scale_end(locations.iter().map(|l| l.mean_error_mm)).unwrap_or(1.0);
-    discs(
-        svg,
-        (&layout, place),
-        &locations,
-        |l| Some(l.mean_error_mm),
-        end,
-    );
-    let mut vectors = String::new();
-    let mut tips = Vec::with_capacity(counted.len());
-    let mut numbers = Vec::with_capacity(counted.len());
-    for p in &counted {
-        if let (Some(t), Some(e)) = (p.truth, p.estimate()) {
-            vectors.push_str(&polyline([layout.px(place, t), layout.px(place, e)], false));
-            tips.push(layout.px(place, e));
-            numbers.push(p.press);
-        }
-    }
-    let dense = if counted.len() > 600 { " dense" } else { "" };
-    let (ellipses, drawn): (String, Vec<PressId>) = regions
+}
+
+fn region_ellipses(
+    svg: &mut Markup,
+    (layout, place): (&Layout, &Place),
+    regions: &[(PressId, Point2, Region)],
+) {
+    let (ellipses, numbers): (String, Vec<PressId>) = regions
         .iter()
-        .map(|(press, at, region)| (ellipse(&layout, place, *at, region), *press))
+        .map(|(press, at, region)| (ellipse(layout, place, *at, region), *press))
         .unzip();
     svg.open("clipPath", &[("id", &"skin-map-frame")]);
     rectangle(svg, "clip", place.frame());
@@ -196,41 +219,42 @@ pub(crate) fn skin_map(input: &ReportInput<'_>) -> Figure {
             ("clip-path", &"url(#skin-map-frame)"),
         ],
     );
-    press_path(svg, "region", &ellipses, &drawn);
+    press_path(svg, "region", &ellipses, &numbers);
     svg.close();
+}
+
+/// Lines from truth to estimate, which ends in a dot.
+fn error_vectors(svg: &mut Markup, (layout, place): (&Layout, &Place), counted: &[&PressResult]) {
+    let mut vectors = String::new();
+    let mut tips = Vec::with_capacity(counted.len());
+    let mut numbers = Vec::with_capacity(counted.len());
+    for p in counted {
+        if let (Some(t), Some(e)) = (p.truth, p.estimate()) {
+            vectors.push_str(&polyline([layout.px(place, t), layout.px(place, e)], false));
+            tips.push(layout.px(place, e));
+            numbers.push(p.press);
+        }
+    }
+    let dense = if counted.len() > 600 { " dense" } else { "" };
     svg.open("g", &[("class", &format_args!("layer-vectors{dense}"))]);
     press_path(svg, "vector", &vectors, &numbers);
     press_path(svg, "dots tips", &dots(tips), &numbers);
     svg.close();
-    let disc = |p: &PressResult| locations.iter().any(|l| l.location == p.location);
-    let shown = others.iter().filter(|p| p.timing.is_some() || !disc(p));
-    let (numbers, points): (Vec<PressId>, Vec<(f64, f64)>) = shown
+}
+
+/// Scored presses that do not count.
+fn uncounted_squares(
+    svg: &mut Markup,
+    (layout, place): (&Layout, &Place),
+    presses: &[&PressResult],
+) {
+    let (numbers, points): (Vec<PressId>, Vec<(f64, f64)>) = presses
+        .iter()
         .map(|p| (p.press, layout.px(place, p.truth.unwrap_or(p.planned))))
         .unzip();
     svg.open("g", &[("class", &"layer-others")]);
     press_path(svg, "other", &squares(points, 10.0), &numbers);
     svg.close();
-    layout.cameras(svg, place, input);
-    svg.leaf("g", &[("class", &"selection")]);
-    svg.close();
-    canvas.moving(SCALE_TO);
-    let beyond = locations.iter().filter(|l| l.mean_error_mm > end).count();
-    error_scale(&mut canvas.svg, "mean error\n(mm)", end, beyond);
-    canvas.svg.close();
-    canvas.moving(LEGEND_TO);
-    column(&mut canvas.svg, (756.0, 400.0), &LEGEND);
-    canvas.svg.close();
-    if counted.is_empty() {
-        canvas.empty("no scored press was located");
-    }
-    let n = format!(
-        "n = {} presses, {} locations",
-        counted.len(),
-        locations.len()
-    );
-    canvas
-        .finish(&foot(input), &n, "presses")
-        .interactive("select")
 }
 
 /// Presses with a 95 % region about their estimate, evenly thinned to [`REGIONS`].
