@@ -8,6 +8,7 @@ mod flatten;
 mod location_results;
 mod locations;
 mod metrics;
+mod no_result;
 mod result;
 mod sequential;
 mod subject;
@@ -18,6 +19,7 @@ pub use comparability::{Difference, RULES, Rule, Severity, differences, fact_dif
 pub use flatten::flatten;
 pub use location_results::{Location, LocationComparison};
 pub use metrics::{DisplayFormat, Metric};
+pub use no_result::NoResult;
 pub use result::{Comparison, ComparisonOptions, Reanalyses, Skin, compare};
 pub use sequential::{Look, SequentialComparison};
 pub use subject::{Session, SessionFacts, Subject};

@@ -8,6 +8,7 @@ use skinrig_model::{PressRole, RepetitionId, Verdict as PressVerdict};
 
 use crate::locations::Locations;
 use crate::metrics::Metric;
+use crate::no_result::NoResult;
 use crate::subject::{Session, Subject};
 use skinrig_statistics::{
     AlphaSpending, ComparisonTarget, Interval, Outlook, Sample, Settings, Verdict, compare,
@@ -29,7 +30,7 @@ pub struct Look {
     /// Verdict on B; `None` if the skins cannot be compared yet.
     pub verdict: Option<Verdict>,
     /// Reason why they cannot be compared.
-    pub refused: Option<String>,
+    pub refused: Option<NoResult>,
 }
 
 /// All looks up to the first that decides.
@@ -93,8 +94,8 @@ pub(crate) fn look(
             Sample::rms(errors)
         });
         let found = match samples {
-            [Ok(a), Ok(b)] => compare(&a, &b, &question, &own).map_err(|e| e.to_string()),
-            [Err(fault), _] | [_, Err(fault)] => Err(fault.to_string()),
+            [Ok(a), Ok(b)] => compare(&a, &b, &question, &own).map_err(NoResult::from),
+            [Err(fault), _] | [_, Err(fault)] => Err(NoResult::from(fault)),
         };
         if let Ok(found) = &found {
             outlook = spending.outlook(found, number, settings);

@@ -4,10 +4,11 @@ use serde::Serialize;
 
 use crate::locations::Locations;
 use crate::metrics::{DisplayFormat, Metric};
+use crate::no_result::NoResult;
 use crate::subject::Subject;
 use skinrig_statistics::{
-    AdjustedComparison, Comparison, ComparisonTarget, Interval, PairSelection, Sample, Settings,
-    Verdict, compare_all, estimate,
+    AdjustedComparison, Comparison, ComparisonTarget, Interval, PairSelection, Sample, SampleFault,
+    Settings, Verdict, compare_all, estimate,
 };
 
 /// Equivalence margins per metric, in the unit of its values.
@@ -19,7 +20,7 @@ pub struct Value {
     /// Value over all locations of the skin, with its interval.
     pub value: Option<Interval>,
     /// Why there is no value.
-    pub missing: Option<String>,
+    pub missing: Option<NoResult>,
 }
 
 /// Comparison of one skin with the first.
@@ -35,7 +36,7 @@ pub struct BaselineComparison {
     pub verdict: Option<Verdict>,
     /// Why they cannot be compared.
     #[serde(rename = "refused")]
-    pub error: Option<String>,
+    pub error: Option<NoResult>,
 }
 
 /// Results for one metric.
@@ -74,8 +75,10 @@ pub(crate) fn table(
             .map(|s| metric.sample(s, locations, within_mm, area_mm2))
             .collect();
         let values = samples.iter().map(|sample| {
-            let value = sample.as_ref().map_err(ToString::to_string);
-            let value = value.and_then(|s| estimate(s, settings).map_err(|e| e.to_string()));
+            let value = match sample {
+                Ok(sample) => estimate(sample, settings).map_err(NoResult::from),
+                Err(fault) => Err(NoResult::from(*fault)),
+            };
             Value {
                 missing: value.as_ref().err().cloned(),
                 value: value.ok(),
@@ -94,14 +97,14 @@ pub(crate) fn table(
     Metric::ALL.into_iter().map(row).collect()
 }
 
-fn against<F: ToString>(
-    samples: Vec<Result<Sample, F>>,
+fn against(
+    samples: Vec<Result<Sample, SampleFault>>,
     metric: Metric,
     margin: Option<f64>,
     settings: &Settings,
 ) -> Vec<BaselineComparison> {
     let count = samples.len();
-    let failed = |subject: usize, reason: String| BaselineComparison {
+    let failed = |subject: usize, reason: NoResult| BaselineComparison {
         subject,
         comparison: None,
         adjusted: None,
@@ -112,18 +115,17 @@ fn against<F: ToString>(
         better: metric.better(),
         margin,
     };
-    let samples: Result<Vec<Sample>, F> = samples.into_iter().collect();
-    let pairs = match samples {
-        Err(fault) => Err(fault.to_string()),
-        Ok(samples) => compare_all(&samples, PairSelection::Reference(0), &question, settings)
-            .map_err(|e| e.to_string()),
-    };
+    let samples: Result<Vec<Sample>, SampleFault> = samples.into_iter().collect();
+    let pairs = samples.map_err(NoResult::from).and_then(|samples| {
+        let pairs = compare_all(&samples, PairSelection::Reference(0), &question, settings)?;
+        Ok(pairs)
+    });
     match pairs {
         Err(why) => (1..count).map(|i| failed(i, why.clone())).collect(),
         Ok(pairs) => pairs
             .into_iter()
             .map(|pair| match pair.alone {
-                Err(why) => failed(pair.b, why.to_string()),
+                Err(why) => failed(pair.b, why.into()),
                 Ok(comparison) => BaselineComparison {
                     subject: pair.b,
                     verdict: Some(pair.adjusted.map_or(comparison.verdict, |a| a.verdict)),

@@ -14,7 +14,9 @@ use crate::cause;
 use crate::pose;
 use crate::prepared::{PreparedChunk, PreparedRecord};
 use crate::query::Fault;
+use crate::record_rows::{self, finite};
 use crate::rows::SessionTotals;
+use crate::{notification, touch};
 
 /// Uncommitted bytes that trigger a commit.
 const COMMIT_BYTES: usize = 8 << 20;
@@ -92,32 +94,7 @@ impl Journal {
                 role,
                 identity,
                 settings,
-            } => {
-                let id = sqlx::query(
-                    "INSERT INTO device (role, model, serial, firmware) VALUES (?, ?, ?, ?)",
-                )
-                .bind(role.name())
-                .bind(identity.model)
-                .bind(identity.serial)
-                .bind(identity.firmware)
-                .execute(&mut self.conn)
-                .await?
-                .last_insert_rowid();
-                for (position, setting) in (0i64..).zip(settings) {
-                    sqlx::query(
-                        "INSERT INTO setting (device, position, name, requested, read_back)
-                         VALUES (?, ?, ?, ?, ?)",
-                    )
-                    .bind(id)
-                    .bind(position)
-                    .bind(setting.name)
-                    .bind(setting.requested)
-                    .bind(setting.read_back)
-                    .execute(&mut self.conn)
-                    .await?;
-                }
-                Ok(())
-            }
+            } => record_rows::device(&mut self.conn, role, identity, settings).await,
             Record::Preflight(checks) => self.preflight(&checks).await,
             // `resume` writes this record before it opens the journal of the leg.
             Record::Resumed(_) => Err(Fault::bad(
@@ -126,48 +103,13 @@ impl Journal {
                 "the header of a leg",
             )),
             Record::Intent { attempt, t } => {
-                sqlx::query(
-                    "INSERT INTO attempt (press, number, previous, intent_ns, leg) VALUES (?, ?, ?, ?, ?)",
-                )
-                .bind(attempt.press.index())
-                .bind(attempt.number)
-                .bind(previous(attempt.number))
-                .bind(t.0)
-                .bind(self.leg)
-                .execute(&mut self.conn)
-                .await?;
-                Ok(())
+                record_rows::intent(&mut self.conn, self.leg, attempt, t).await
             }
             Record::Command { t, command } => {
-                let [x, y, z] = command.target.to_array();
-                for value in [x, y, z, command.speed_mm_s] {
-                    finite("a motion command", value)?;
-                }
-                sqlx::query(
-                    "INSERT INTO command (t_ns, x_mm, y_mm, z_mm, speed_mm_s) VALUES (?, ?, ?, ?, ?)",
-                )
-                .bind(t.0)
-                .bind(x)
-                .bind(y)
-                .bind(z)
-                .bind(command.speed_mm_s)
-                .execute(&mut self.conn)
-                .await?;
-                Ok(())
+                record_rows::command(&mut self.conn, t, &command).await
             }
             Record::Poses(samples) => self.poses(&samples).await,
-            Record::MarkSent(mark) => {
-                sqlx::query(
-                    "INSERT INTO mark (t_ns, kind, press, uncertainty_ns) VALUES (?, ?, ?, ?)",
-                )
-                .bind(mark.t.0)
-                .bind(mark.mark.kind.name())
-                .bind(mark.mark.press.index())
-                .bind(mark.uncertainty_ns)
-                .execute(&mut self.conn)
-                .await?;
-                Ok(())
-            }
+            Record::MarkSent(mark) => record_rows::mark(&mut self.conn, &mark).await,
             Record::BoxReports { t, reports } => {
                 for report in reports {
                     self.box_report(t, report).await?;
@@ -180,56 +122,15 @@ impl Journal {
             }
             Record::Outcome(outcome) => self.outcome(&outcome).await,
             Record::Missed(attempt, reason) => {
-                sqlx::query(
-                    "INSERT INTO attempt (press, number, previous, verdict, reason, cause, scheduled, leg)
-                     VALUES (?, ?, ?, 'missed', ?, ?, 0, ?)",
-                )
-                .bind(attempt.press.index())
-                .bind(attempt.number)
-                .bind(previous(attempt.number))
-                .bind(reason.to_string())
-                .bind(cause::json("attempt", &reason)?)
-                .bind(self.leg)
-                .execute(&mut self.conn)
-                .await?;
-                Ok(())
+                record_rows::missed(&mut self.conn, self.leg, attempt, &reason).await
             }
             Record::Interruption { kind, t, reason } => {
-                sqlx::query(
-                    "INSERT INTO interruption (t_ns, kind, reason, cause) VALUES (?, ?, ?, ?)",
-                )
-                .bind(t.0)
-                .bind(kind.name())
-                .bind(reason.to_string())
-                .bind(cause::json("interruption", &reason)?)
-                .execute(&mut self.conn)
-                .await?;
-                Ok(())
+                record_rows::interruption(&mut self.conn, kind, t, &reason).await
             }
-            Record::Note { t, text } => {
-                sqlx::query("INSERT INTO note (t_ns, text) VALUES (?, ?)")
-                    .bind(t.0)
-                    .bind(text)
-                    .execute(&mut self.conn)
-                    .await?;
-                Ok(())
-            }
-            Record::Touch(it) => crate::touch::insert(&mut self.conn, &it).await,
-            Record::Notification(it) => {
-                crate::notification::insert(&mut self.conn, self.leg, &it).await
-            }
-            Record::Ended { t, end } => {
-                sqlx::query(
-                    "INSERT INTO run_end (id, t_ns, status, reason, cause) VALUES (1, ?, ?, ?, ?)",
-                )
-                .bind(t.0)
-                .bind(end.name())
-                .bind(end.reason())
-                .bind(cause::json_of("run_end", end.cause())?)
-                .execute(&mut self.conn)
-                .await?;
-                Ok(())
-            }
+            Record::Note { t, text } => record_rows::note(&mut self.conn, t, &text).await,
+            Record::Touch(it) => touch::insert(&mut self.conn, &it).await,
+            Record::Notification(it) => notification::insert(&mut self.conn, self.leg, &it).await,
+            Record::Ended { t, end } => record_rows::ended(&mut self.conn, t, &end).await,
         }
     }
 
@@ -542,18 +443,5 @@ impl Journal {
             )));
         }
         Ok(Ok(totals))
-    }
-}
-
-fn previous(number: u32) -> Option<u32> {
-    number.checked_sub(1).filter(|n| *n > 0)
-}
-
-/// Rejects NaN, which SQLite would silently store as null, and infinity.
-fn finite(place: impl ToString, value: f64) -> Result<(), Fault> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(Fault::bad(place, "a finite number", value))
     }
 }

@@ -44,6 +44,7 @@ mod prepared;
 mod problem;
 mod query;
 mod queue;
+mod record_rows;
 mod rescue;
 mod resume;
 mod salvage;

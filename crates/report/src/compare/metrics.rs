@@ -49,7 +49,11 @@ fn metric(result: &Comparison, row: &skinrig_compare::Row, k: usize) -> Option<R
     );
     let verdict = text::verdict(found.verdict);
     let pill = format!("pill {}", verdict.replace(' ', "-"));
-    let note = found.error.clone().or_else(|| needed(result, row, found));
+    let note = found
+        .error
+        .as_ref()
+        .map(ToString::to_string)
+        .or_else(|| needed(result, row, found));
     let style = match found.verdict {
         Some(Verdict::Worse) => Some(Style::Warning),
         Some(Verdict::Better) => Some(Style::Bold),

@@ -123,7 +123,10 @@ pub(super) fn counted(n: usize, what: &str) -> String {
 /// RMSE of a skin and the first, with difference and interval.
 pub(super) fn headline(result: &Result, against: &BaselineComparison) -> String {
     let (Some(row), Some(c)) = (result.headline(), &against.comparison) else {
-        return against.error.clone().unwrap_or_default();
+        return against
+            .error
+            .as_ref()
+            .map_or_else(String::new, ToString::to_string);
     };
     format!(
         "RMSE {} → {} mm, difference {} mm {}",
