@@ -32,7 +32,7 @@ fn is_met(rule: StopRule, sighting: &Sighting) -> bool {
 pub(super) fn words(rule: StopRule) -> String {
     match rule {
         StopRule::Region(mm) => format!("region within {mm} mm"),
-        StopRule::After(ms) => format!("{ms} ms after the onset"),
+        StopRule::After(ms) => format!("stop after {ms} ms"),
     }
 }
 
@@ -76,6 +76,8 @@ pub(super) struct Felts {
     pub(super) missed: usize,
     pub(super) alarmed: usize,
     pub(super) delay_ms: Quantiles,
+    /// Depth of the measured tip when the touch was felt, mm; of sessions with poses.
+    pub(super) depth_mm: Quantiles,
     pub(super) release_ms: Quantiles,
     pub(super) false_alarms: u64,
     pub(super) at_risk_s: f64,
@@ -94,11 +96,18 @@ impl Felts {
         sightings: &[Sighting],
         stop: StopRule,
         until_us: i64,
+        tip_depth_mm: impl Fn(f64) -> Option<f64>,
     ) -> Self {
         let (presses, outside): (Vec<ScoredPress>, Vec<ScoredPress>) = ScoredPress::of(analysis)
             .into_iter()
             .partition(|p| p.release_us + 100e3 < until_us as f64);
         let score = DetectionScore::new(found, &presses);
+        let felt_us = |(row, delay_ms): &(usize, f64)| {
+            let press = presses.iter().find(|press| press.row == *row)?;
+            Some(press.contact_us + delay_ms * 1e3)
+        };
+        let felt_us = score.delays_ms.iter().filter_map(felt_us);
+        let depths_mm = felt_us.filter_map(tip_depth_mm).collect();
         let of_press = |press: &ScoredPress| {
             let range = press.contact_us - 1e3..press.release_us;
             let onset = found
@@ -120,6 +129,7 @@ impl Felts {
             missed: score.missed,
             alarmed: score.alarmed,
             delay_ms: Quantiles::of(score.delays_ms.iter().map(|d| d.1).collect()),
+            depth_mm: Quantiles::of(depths_mm),
             release_ms: Quantiles::of(score.releases_ms.clone()),
             false_alarms: score.false_alarms,
             at_risk_s: score.at_risk_s,
