@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde::{Serialize, Serializer};
-use skinrig_evk1::CameraState;
+use skinrig_evk1::{CameraState, FoundDevice};
 use skinrig_hil::lease::{self, LeaseState};
 use skinrig_omega3::enumerate::{Availability, SERIAL_UNKNOWN};
 use skinrig_omega3::load::LoadError;
@@ -214,14 +214,53 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
     lines
 }
 
-fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
-    let line = |what: &str, state, detail: String| Line {
+fn camera_line(what: &str, state: DeviceState, detail: String) -> Line {
+    Line {
         device: "camera",
         what: what.to_owned(),
         state,
         detail,
         ..Line::default()
+    }
+}
+
+/// A camera with the USB IDs of an EVK1; `role_of` gives the role of a serial number or port.
+fn evk1_line(found: &FoundDevice, role_of: &dyn Fn(&str) -> Option<String>) -> Line {
+    let what = |model: &str| format!("{model}, {}", found.place);
+    let line = match &found.state {
+        CameraState::Ready(identity) => Line {
+            serial: Some(identity.serial.clone()),
+            role: role_of(&identity.serial).or_else(|| role_of(found.port.as_deref()?)),
+            firmware: Some(identity.firmware()),
+            ..camera_line(
+                &what("EVK1 Gen3.1"),
+                DeviceState::Ready,
+                identity.firmware(),
+            )
+        },
+        CameraState::Busy => camera_line(
+            &what("camera"),
+            DeviceState::Busy,
+            "in use by another program".to_owned(),
+        ),
+        CameraState::NoPermission => {
+            camera_line(&what("camera"), DeviceState::NotPermitted, String::new())
+        }
+        CameraState::NotEvk1(other) => camera_line(
+            &what("not an EVK1"),
+            DeviceState::OtherDevice,
+            other.clone(),
+        ),
+        CameraState::Faulty(why) => camera_line(&what("camera"), DeviceState::Faulty, why.clone()),
     };
+    Line {
+        next_step: found.next_step(),
+        usb: Some(found.address),
+        ..line
+    }
+}
+
+fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
     let role_of = |serial: &str| {
         let cameras = &rig?.cameras;
         let roles = ["camera1", "camera2"];
@@ -231,49 +270,11 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
     let mut lines = Vec::new();
     let others = other_cameras(&mut lines, &role_of);
     match skinrig_evk1::enumerate() {
-        Err(e) => lines.push(line("USB", DeviceState::Faulty, e.to_string())),
-        Ok(found) => lines.extend(
-            found
-                .iter()
-                .filter(|f| !others.contains(&f.address))
-                .map(|f| {
-                    let next_step = f.next_step();
-                    let place = |model: &str| format!("{model}, {}", f.place);
-                    let found = match &f.state {
-                        CameraState::Ready(identity) => Line {
-                            serial: Some(identity.serial.clone()),
-                            role: role_of(&identity.serial).or_else(|| role_of(f.port.as_deref()?)),
-                            firmware: Some(identity.firmware()),
-                            ..line(
-                                &place("EVK1 Gen3.1"),
-                                DeviceState::Ready,
-                                identity.firmware(),
-                            )
-                        },
-                        CameraState::Busy => line(
-                            &place("camera"),
-                            DeviceState::Busy,
-                            "in use by another program".to_owned(),
-                        ),
-                        CameraState::NoPermission => {
-                            line(&place("camera"), DeviceState::NotPermitted, String::new())
-                        }
-                        CameraState::NotEvk1(what) => line(
-                            &place("not an EVK1"),
-                            DeviceState::OtherDevice,
-                            what.clone(),
-                        ),
-                        CameraState::Faulty(what) => {
-                            line(&place("camera"), DeviceState::Faulty, what.clone())
-                        }
-                    };
-                    Line {
-                        next_step,
-                        usb: Some(f.address),
-                        ..found
-                    }
-                }),
-        ),
+        Err(e) => lines.push(camera_line("USB", DeviceState::Faulty, e.to_string())),
+        Ok(found) => {
+            let evk1 = found.iter().filter(|f| !others.contains(&f.address));
+            lines.extend(evk1.map(|f| evk1_line(f, &role_of)));
+        }
     }
     for (role, camera) in ["camera1", "camera2"]
         .into_iter()
@@ -289,7 +290,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
     if rig.is_none() && lines.is_empty() {
         lines.push(Line {
             next_step: Some("check cable and power; an EVK1 needs USB 3".to_owned()),
-            ..line(
+            ..camera_line(
                 "EVK1",
                 DeviceState::Absent,
                 "no device with the USB IDs of an EVK1".to_owned(),

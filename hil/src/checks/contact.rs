@@ -31,41 +31,47 @@ pub(super) fn depth(check: &Check, bench: &mut dyn Bench, findings: &mut Finding
     if skip_without_skin(bench, findings) {
         return;
     }
-    let metrics = &["surface", "error"];
     with_arm(
         bench,
         Reach::Skin,
         findings,
-        metrics,
-        &mut |arm, findings| {
-            check_depth_limit(arm, depth_mm)?;
-            let (mut surface_mm, mut squares, mut n) = (0.0_f64, 0.0, 0);
-            for at in arm.volume.press_points.clone() {
-                for _ in 0..presses {
-                    arm.go_above(at)?;
-                    let touched_mm = arm.touch()?;
-                    let mut samples = Vec::new();
-                    let bottom = at.at_height(touched_mm - depth_mm);
-                    arm.send(bottom, INDENTATION_MM_S)?;
-                    let down = HostDuration::from_secs_f64(
-                        (arm.search.band_mm * 2.0 + depth_mm) / INDENTATION_MM_S,
-                    );
-                    arm.watch(HostDuration(down.0 + SETTLE.0), &mut samples, |_| false)?;
-                    arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
-                    let reached_mm = touched_mm - mean(last(&samples, AVERAGING)).z_mm;
-                    squares += (reached_mm - depth_mm).powi(2);
-                    surface_mm = surface_mm.max(touched_mm.abs());
-                    n += 1;
-                }
-            }
-            findings
-                .value(ROBOT, "surface", surface_mm)
-                .with_samples(n, 3);
-            let error_mm = (squares / n as f64).sqrt();
-            findings.value(ROBOT, "error", error_mm).with_samples(n, 3);
-            Ok(())
-        },
+        &["surface", "error"],
+        &mut |arm, findings| press_to_depth(arm, findings, depth_mm, presses),
     );
+}
+
+fn press_to_depth(
+    arm: &mut Arm<'_>,
+    findings: &mut Findings,
+    depth_mm: f64,
+    presses: u32,
+) -> Result<(), Problem> {
+    check_depth_limit(arm, depth_mm)?;
+    let (mut surface_mm, mut squares, mut n) = (0.0_f64, 0.0, 0);
+    for at in arm.volume.press_points.clone() {
+        for _ in 0..presses {
+            arm.go_above(at)?;
+            let touched_mm = arm.touch()?;
+            let mut samples = Vec::new();
+            let bottom = at.at_height(touched_mm - depth_mm);
+            arm.send(bottom, INDENTATION_MM_S)?;
+            let down = HostDuration::from_secs_f64(
+                (arm.search.band_mm * 2.0 + depth_mm) / INDENTATION_MM_S,
+            );
+            arm.watch(HostDuration(down.0 + SETTLE.0), &mut samples, |_| false)?;
+            arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
+            let reached_mm = touched_mm - mean(last(&samples, AVERAGING)).z_mm;
+            squares += (reached_mm - depth_mm).powi(2);
+            surface_mm = surface_mm.max(touched_mm.abs());
+            n += 1;
+        }
+    }
+    findings
+        .value(ROBOT, "surface", surface_mm)
+        .with_samples(n, 3);
+    let error_mm = (squares / n as f64).sqrt();
+    findings.value(ROBOT, "error", error_mm).with_samples(n, 3);
+    Ok(())
 }
 
 /// Marks the check as not applicable if the rig has no skin mounted.
@@ -102,61 +108,66 @@ pub(super) fn force_ceiling(check: &Check, bench: &mut dyn Bench, findings: &mut
     if skip_without_skin(bench, findings) {
         return;
     }
-    let metrics = &["peak", "trips"];
     with_arm(
         bench,
         Reach::Skin,
         findings,
-        metrics,
-        &mut |arm, findings| {
-            check_depth_limit(arm, depth_mm)?;
-            let at = arm.volume.centre;
-            let [high, ..] = arm.volume.air_points();
-            arm.go(high, super::robot::TRAVEL_MM_S)?;
-            let settings = arm.limit_force(Some(force_n))?;
-            check_carries_arm(arm, force_n)?;
-            arm.go_above(at)?;
-            let mut samples = Vec::new();
-            arm.send(at.at_height(-depth_mm), INDENTATION_MM_S)?;
-            let down =
-                HostDuration::from_secs_f64((depth_mm + arm.search.band_mm) / INDENTATION_MM_S);
-            let pressed = arm.watch(HostDuration(down.0 + SETTLE.0), &mut samples, |_| false);
-            let peak_n = peak_n(&samples);
-            let trips = match pressed {
-                // The robot enforced the limit by switching its motors off.
-                Err(problem) if problem.kind == EvidenceKind::State => {
-                    findings.evidence.push(*problem);
-                    1.0
-                }
-                Err(problem) => return Err(problem),
-                Ok(()) => {
-                    arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
-                    arm.limit_force(None)?;
-                    0.0
-                }
-            };
-            let enough = peak_n >= LIMIT_SHARE * force_n;
-            let read_back = settings.iter().find(|s| s.name == "max_force_n");
-            let read_back = read_back.map_or("nothing", |s| s.read_back.as_str());
-            let lowest_mm = samples.iter().map(|s| -s.measured.z_mm).fold(0.0, f64::max);
-            findings
-            .value(ROBOT, "peak", peak_n)
-            .with_samples(usize::from(enough), 1)
-            .with_note(format!(
-                "limit {force_n} N, read back {read_back}; commanded {depth_mm} mm, reached {lowest_mm:.2} mm"
-            ));
-            findings.value(ROBOT, "trips", trips).with_samples(1, 1);
-            if !enough {
-                let what = format!(
-                    "expected a force of about {force_n} N, found {peak_n:.2} N: the skin is too soft at this depth"
-                );
-                let next = "increase `depth` of the check, or reduce `force`";
-                let few = Evidence::new(EvidenceKind::TooLittle, ROBOT, what);
-                findings.evidence.push(few.next(next));
-            }
-            Ok(())
-        },
+        &["peak", "trips"],
+        &mut |arm, findings| press_to_force_limit(arm, findings, force_n, depth_mm),
     );
+}
+
+fn press_to_force_limit(
+    arm: &mut Arm<'_>,
+    findings: &mut Findings,
+    force_n: f64,
+    depth_mm: f64,
+) -> Result<(), Problem> {
+    check_depth_limit(arm, depth_mm)?;
+    let at = arm.volume.centre;
+    let [high, ..] = arm.volume.air_points();
+    arm.go(high, super::robot::TRAVEL_MM_S)?;
+    let settings = arm.limit_force(Some(force_n))?;
+    check_carries_arm(arm, force_n)?;
+    arm.go_above(at)?;
+    let mut samples = Vec::new();
+    arm.send(at.at_height(-depth_mm), INDENTATION_MM_S)?;
+    let down = HostDuration::from_secs_f64((depth_mm + arm.search.band_mm) / INDENTATION_MM_S);
+    let pressed = arm.watch(HostDuration(down.0 + SETTLE.0), &mut samples, |_| false);
+    let peak_n = peak_n(&samples);
+    let trips = match pressed {
+        // The robot enforced the limit by switching its motors off.
+        Err(problem) if problem.kind == EvidenceKind::State => {
+            findings.evidence.push(*problem);
+            1.0
+        }
+        Err(problem) => return Err(problem),
+        Ok(()) => {
+            arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
+            arm.limit_force(None)?;
+            0.0
+        }
+    };
+    let enough = peak_n >= LIMIT_SHARE * force_n;
+    let read_back = settings.iter().find(|s| s.name == "max_force_n");
+    let read_back = read_back.map_or("nothing", |s| s.read_back.as_str());
+    let lowest_mm = samples.iter().map(|s| -s.measured.z_mm).fold(0.0, f64::max);
+    findings
+    .value(ROBOT, "peak", peak_n)
+    .with_samples(usize::from(enough), 1)
+    .with_note(format!(
+        "limit {force_n} N, read back {read_back}; commanded {depth_mm} mm, reached {lowest_mm:.2} mm"
+    ));
+    findings.value(ROBOT, "trips", trips).with_samples(1, 1);
+    if !enough {
+        let what = format!(
+            "expected a force of about {force_n} N, found {peak_n:.2} N: the skin is too soft at this depth"
+        );
+        let next = "increase `depth` of the check, or reduce `force`";
+        let few = Evidence::new(EvidenceKind::TooLittle, ROBOT, what);
+        findings.evidence.push(few.next(next));
+    }
+    Ok(())
 }
 
 /// Verifies in free air, where sagging is harmless, that the motors carry the arm under the force limit.

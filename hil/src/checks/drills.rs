@@ -69,37 +69,39 @@ pub(super) fn stop(_: &Check, bench: &mut dyn Bench, findings: &mut Findings) {
     if skip_unless_permitted(bench, Drill::Stop, "stop", findings) {
         return;
     }
-    let metrics = &["stopped_within", "distance"];
     with_arm(
         bench,
         Reach::Air,
         findings,
-        metrics,
-        &mut |arm, findings| {
-            let [_, east, _, west, _] = arm.volume.air_points();
-            let held = stop_between(arm, west, east, |arm| arm.hold())?;
-            // Switch the motors off, as an operator's third ctrl-C does. The arm cannot be armed afterwards.
-            let halted = stop_between(arm, west, east, |arm| arm.halt())?;
-            let note = format!(
-                "held: {:.0} ms, {:.2} mm; motors off: {:.0} ms, {:.2} mm",
-                held.within_s * 1e3,
-                held.distance_mm,
-                halted.within_s * 1e3,
-                halted.distance_mm
-            );
-            let within_s = held.within_s.max(halted.within_s);
-            findings
-                .value(ROBOT, "stopped_within", within_s)
-                .with_samples(2, 2)
-                .with_note(note.as_str());
-            let distance_mm = held.distance_mm.max(halted.distance_mm);
-            findings
-                .value(ROBOT, "distance", distance_mm)
-                .with_samples(2, 2)
-                .with_note(note);
-            Ok(())
-        },
+        &["stopped_within", "distance"],
+        &mut stop_twice,
     );
+}
+
+/// Holds the arm in motion, then switches the motors off in motion.
+fn stop_twice(arm: &mut Arm<'_>, findings: &mut Findings) -> Result<(), Problem> {
+    let [_, east, _, west, _] = arm.volume.air_points();
+    let held = stop_between(arm, west, east, |arm| arm.hold())?;
+    // Switch the motors off, as an operator's third ctrl-C does. The arm cannot be armed afterwards.
+    let halted = stop_between(arm, west, east, |arm| arm.halt())?;
+    let note = format!(
+        "held: {:.0} ms, {:.2} mm; motors off: {:.0} ms, {:.2} mm",
+        held.within_s * 1e3,
+        held.distance_mm,
+        halted.within_s * 1e3,
+        halted.distance_mm
+    );
+    let within_s = held.within_s.max(halted.within_s);
+    findings
+        .value(ROBOT, "stopped_within", within_s)
+        .with_samples(2, 2)
+        .with_note(note.as_str());
+    let distance_mm = held.distance_mm.max(halted.distance_mm);
+    findings
+        .value(ROBOT, "distance", distance_mm)
+        .with_samples(2, 2)
+        .with_note(note);
+    Ok(())
 }
 
 /// Response to a stop command.

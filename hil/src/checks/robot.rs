@@ -97,35 +97,41 @@ pub(super) fn repeatability(check: &Check, bench: &mut dyn Bench, findings: &mut
     else {
         return;
     };
-    let metrics = &["spread", "error"];
     with_arm(
         bench,
         Reach::Air,
         findings,
-        metrics,
-        &mut |arm, findings| {
-            let points = arm.volume.air_points();
-            let mut positions = vec![Vec::new(); points.len()];
-            for approach in 0..approaches {
-                for (target, positions) in points.iter().zip(&mut positions) {
-                    let from = approach_start(*target, approach, approaches);
-                    positions.push(approach_from(arm, from, *target, speed_mm_s)?);
-                }
-            }
-            let n = positions.iter().map(Vec::len).sum::<usize>();
-            let spread_mm = spread_mm(&positions);
-            findings
-                .value(ROBOT, "spread", spread_mm)
-                .with_samples(n, 10);
-            let errors_mm = points
-                .iter()
-                .zip(&positions)
-                .flat_map(|(target, positions)| positions.iter().map(|p| p.distance_mm(*target)));
-            let error_mm = errors_mm.sum::<f64>() / n as f64;
-            findings.value(ROBOT, "error", error_mm).with_samples(n, 10);
-            Ok(())
-        },
+        &["spread", "error"],
+        &mut |arm, findings| approach_points(arm, findings, approaches, speed_mm_s),
     );
+}
+
+fn approach_points(
+    arm: &mut Arm<'_>,
+    findings: &mut Findings,
+    approaches: u32,
+    speed_mm_s: f64,
+) -> Result<(), Problem> {
+    let points = arm.volume.air_points();
+    let mut positions = vec![Vec::new(); points.len()];
+    for approach in 0..approaches {
+        for (target, positions) in points.iter().zip(&mut positions) {
+            let from = approach_start(*target, approach, approaches);
+            positions.push(approach_from(arm, from, *target, speed_mm_s)?);
+        }
+    }
+    let n = positions.iter().map(Vec::len).sum::<usize>();
+    let spread_mm = spread_mm(&positions);
+    findings
+        .value(ROBOT, "spread", spread_mm)
+        .with_samples(n, 10);
+    let errors_mm = points
+        .iter()
+        .zip(&positions)
+        .flat_map(|(target, positions)| positions.iter().map(|p| p.distance_mm(*target)));
+    let error_mm = errors_mm.sum::<f64>() / n as f64;
+    findings.value(ROBOT, "error", error_mm).with_samples(n, 10);
+    Ok(())
 }
 
 /// Start of approach `n` of `of`: from a different side each time, alternately from above and from
@@ -184,45 +190,51 @@ pub(super) fn step_response(check: &Check, bench: &mut dyn Bench, findings: &mut
     let Measure::StepResponse { distance_mm, steps } = check.measure else {
         return;
     };
-    let metrics = &["settling", "overshoot", "error"];
     with_arm(
         bench,
         Reach::Air,
         findings,
-        metrics,
-        &mut |arm, findings| {
-            let [centre, ..] = arm.volume.air_points();
-            let mut responses = Vec::new();
-            arm.go(centre, TRAVEL_MM_S)?;
-            let mut from = centre;
-            for n in 0..steps {
-                let target = if n.is_multiple_of(2) {
-                    step_target(centre, distance_mm, n / 2)
-                } else {
-                    centre
-                };
-                let response = measure_step(arm, from, target)?;
-                responses.extend(response);
-                from = target;
-            }
-            let n = responses.len();
-            let most = |of: fn(&Response) -> f64| responses.iter().map(of).fold(0.0, f64::max);
-            let mut settling: Vec<f64> = responses.iter().map(|r| r.settling_s).collect();
-            settling.sort_by(f64::total_cmp);
-            if let Some(median) = settling.get(n / 2) {
-                findings
-                    .value(ROBOT, "settling", *median)
-                    .with_samples(n, 3);
-                findings
-                    .value(ROBOT, "overshoot", most(|r| r.overshoot_mm))
-                    .with_samples(n, 3);
-                findings
-                    .value(ROBOT, "error", most(|r| r.error_mm))
-                    .with_samples(n, 3);
-            }
-            Ok(())
-        },
+        &["settling", "overshoot", "error"],
+        &mut |arm, findings| measure_steps(arm, findings, distance_mm, steps),
     );
+}
+
+fn measure_steps(
+    arm: &mut Arm<'_>,
+    findings: &mut Findings,
+    distance_mm: f64,
+    steps: u32,
+) -> Result<(), Problem> {
+    let [centre, ..] = arm.volume.air_points();
+    let mut responses = Vec::new();
+    arm.go(centre, TRAVEL_MM_S)?;
+    let mut from = centre;
+    for n in 0..steps {
+        let target = if n.is_multiple_of(2) {
+            step_target(centre, distance_mm, n / 2)
+        } else {
+            centre
+        };
+        let response = measure_step(arm, from, target)?;
+        responses.extend(response);
+        from = target;
+    }
+    let n = responses.len();
+    let most = |of: fn(&Response) -> f64| responses.iter().map(of).fold(0.0, f64::max);
+    let mut settling: Vec<f64> = responses.iter().map(|r| r.settling_s).collect();
+    settling.sort_by(f64::total_cmp);
+    if let Some(median) = settling.get(n / 2) {
+        findings
+            .value(ROBOT, "settling", *median)
+            .with_samples(n, 3);
+        findings
+            .value(ROBOT, "overshoot", most(|r| r.overshoot_mm))
+            .with_samples(n, 3);
+        findings
+            .value(ROBOT, "error", most(|r| r.error_mm))
+            .with_samples(n, 3);
+    }
+    Ok(())
 }
 
 /// Target of step `n`: alternately along +x, +y, -x and -y.
