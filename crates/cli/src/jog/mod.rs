@@ -116,10 +116,10 @@ fn simulated() -> Bench {
     }
 }
 
-/// Limits in robot coordinates, because the location of the skin is not known before a touch-off. [`Floor`] limits the depth below
+/// Jogs in robot coordinates, because the location of the skin is not known before a touch-off. The [`Floor`] limits the depth below
 /// the surface of the current frame.
-fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
-    let run = RunLimits {
+fn setup(bench: &Bench, beyond_frame: bool, control: ControlHandle) -> JogSetup {
+    let limits = RunLimits {
         workspace_min_mm: bench.min_mm,
         workspace_max_mm: bench.max_mm,
         // In these coordinates the workspace limits the depth.
@@ -132,14 +132,48 @@ fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
         max_acceleration_mm_s2: None,
         on_trip: TripReaction::Retract,
     };
-    let robot = MotionLimits {
+    let robot_limits = MotionLimits {
         min_mm: bench.min_mm,
         max_mm: bench.max_mm,
         max_speed_mm_s: bench.max_speed_mm_s,
         max_acceleration_mm_s2: bench.max_acceleration_mm_s2,
         max_force_n: bench.max_force_n,
     };
-    (run, robot)
+    let floor = Floor {
+        skin_from_robot: bench.robot_from_skin.inverse(),
+        max_depth_mm: bench.max_depth_mm,
+    };
+    JogSetup {
+        robot_from_skin: RigidTransform::identity(),
+        limits,
+        robot_limits,
+        floor: (!beyond_frame).then_some(floor),
+        control,
+        settings: ControllerSettings {
+            stale_after: bench::SLOW_STALE,
+            ..ControllerSettings::default()
+        },
+    }
+}
+
+/// Sets `stop` at the first ctrl-C, switches the motors off at the third, and ends the program at the fourth.
+fn on_ctrl_c(stop: Arc<AtomicBool>, control: ControlHandle) -> Result<(), Failure> {
+    signals::on_ctrl_c(move |times| {
+        stop.store(true, Ordering::SeqCst);
+        match times {
+            1 => errln!(
+                "\nholding, retracting, disarming; ctrl-C twice more switches the motors off"
+            ),
+            2 => errln!("\nctrl-C once more switches the motors off where the tip is"),
+            3 => {
+                errln!("\nswitching the motors off");
+                control.halt();
+            }
+            // Something hangs; after the exit the supervisor brakes the arm.
+            _ => std::process::exit(i32::from(Exit::Stopped.code())),
+        }
+    })
+    .map_err(Failure::internal)
 }
 
 /// `skinrig jog`.
@@ -152,98 +186,27 @@ pub(crate) fn jog(args: &JogArgs) -> Outcome {
     let idle = Duration::try_from_secs_f64(args.idle)
         .map_err(|e| Failure::input(format!("--idle: {e}")))?;
     let stop = Arc::new(AtomicBool::new(false));
-    let pressed = Arc::clone(&stop);
     let control = ControlHandle::new();
-    let halter = control.clone();
-    signals::on_ctrl_c(move |times| {
-        pressed.store(true, Ordering::SeqCst);
-        match times {
-            1 => errln!(
-                "\nholding, retracting, disarming; ctrl-C twice more switches the motors off"
-            ),
-            2 => errln!("\nctrl-C once more switches the motors off where the tip is"),
-            3 => {
-                errln!("\nswitching the motors off");
-                halter.halt();
-            }
-            // Something hangs; after the exit the supervisor brakes the arm.
-            _ => std::process::exit(i32::from(Exit::Stopped.code())),
-        }
-    })
-    .map_err(Failure::internal)?;
+    on_ctrl_c(Arc::clone(&stop), control.clone())?;
 
     // Opened after the ctrl-C handler is set: from here on the arm may be live.
     let (bench, _lease) = open(args)?;
-    let (run, robot_limits) = limits(&bench);
-    let skin_from_robot = bench.robot_from_skin.inverse();
-    let floor = Floor {
-        skin_from_robot,
-        max_depth_mm: bench.max_depth_mm,
-    };
-    let setup = JogSetup {
-        robot_from_skin: RigidTransform::identity(),
-        limits: run,
-        robot_limits,
-        floor: (!args.beyond_frame).then_some(floor),
-        control,
-        settings: ControllerSettings {
-            stale_after: bench::SLOW_STALE,
-            ..ControllerSettings::default()
-        },
-    };
+    let setup = setup(&bench, args.beyond_frame, control);
     let jog = Jog::start(bench.indenter, bench.clock, &setup).map_err(Failure::rig)?;
     let mut console = Console {
         jog,
         stop,
         search: bench.search,
-        speed_mm_s: FIRST_SPEED_MM_S.min(run.max_speed_mm_s),
+        speed_mm_s: FIRST_SPEED_MM_S.min(setup.limits.max_speed_mm_s),
         idle,
-        skin_from_robot,
+        skin_from_robot: bench.robot_from_skin.inverse(),
         last_touch: None,
         points: Vec::new(),
     };
-    let identity = console.jog.identity();
-    outln!(
-        "{}: {} {}; coordinates in the robot's frame; `help` lists the commands; ctrl-C holds, retracts and disarms;\n\
-         so do {} s without input (--idle)\nlog       {}",
-        bench.name,
-        identity.model,
-        identity.serial,
-        args.idle,
-        log.path().display()
-    );
-    let started = format!("{}: {} {}", bench.name, identity.model, identity.serial);
-    log.line(console.jog.now(), "start", &started);
-    if args.beyond_frame {
-        let words = "--beyond-frame: only the workspace limits the depth";
-        log.line(console.jog.now(), "limit", words);
-        outln!("limit     {words}");
-    } else {
-        let words = format!("{} mm below the frame's surface", floor.max_depth_mm);
-        log.line(console.jog.now(), "limit", &words);
-        outln!("limit     {words} (--beyond-frame for a lower skin)");
-    }
-    for note in console.jog.take_notes() {
-        log.line(console.jog.now(), "note", &note);
-        outln!("note      {note}");
-    }
+    console.print_start(&bench.name, setup.floor, &mut log);
     let outcome = console.execute_input(&mut log);
     let ended = console.jog.finish();
-    log.path_of_tip(&console.jog.take_trace());
-    let t = console.jog.now();
-    if !console.points.is_empty() {
-        let block = console.block();
-        log.line(t, "points", &block);
-        outln!("{block}");
-    }
-    match &ended {
-        Ok(at) => {
-            let place = at.map_or_else(|| "no known pose".to_owned(), |p| describe_pose(&p));
-            log.line(t, "end", &format!("disarmed at {place}"));
-            outln!("disarmed at {place}");
-        }
-        Err(e) => log.line(t, "end", &format!("error: {e}")),
-    }
+    console.print_end(&ended, &mut log);
     let exit = outcome?;
     ended.map_err(|e| {
         Failure::rig(format!(
@@ -278,6 +241,53 @@ struct Console {
 }
 
 impl Console {
+    /// Prints and logs the robot, the limit of the depth and the robot's notes.
+    fn print_start(&mut self, bench: &str, floor: Option<Floor>, log: &mut Log) {
+        let identity = self.jog.identity();
+        outln!(
+            "{bench}: {} {}; coordinates in the robot's frame; `help` lists the commands; ctrl-C holds, retracts and disarms;\n\
+             so do {} s without input (--idle)\nlog       {}",
+            identity.model,
+            identity.serial,
+            self.idle.as_secs_f64(),
+            log.path().display()
+        );
+        let started = format!("{bench}: {} {}", identity.model, identity.serial);
+        log.line(self.jog.now(), "start", &started);
+        if let Some(floor) = floor {
+            let words = format!("{} mm below the frame's surface", floor.max_depth_mm);
+            log.line(self.jog.now(), "limit", &words);
+            outln!("limit     {words} (--beyond-frame for a lower skin)");
+        } else {
+            let words = "--beyond-frame: only the workspace limits the depth";
+            log.line(self.jog.now(), "limit", words);
+            outln!("limit     {words}");
+        }
+        for note in self.jog.take_notes() {
+            log.line(self.jog.now(), "note", &note);
+            outln!("note      {note}");
+        }
+    }
+
+    /// Prints and logs the named points and where the robot was disarmed.
+    fn print_end(&mut self, ended: &Result<Option<PoseSample>, RunFault>, log: &mut Log) {
+        log.path_of_tip(&self.jog.take_trace());
+        let t = self.jog.now();
+        if !self.points.is_empty() {
+            let block = self.block();
+            log.line(t, "points", &block);
+            outln!("{block}");
+        }
+        match ended {
+            Ok(at) => {
+                let place = at.map_or_else(|| "no known pose".to_owned(), |p| describe_pose(&p));
+                log.line(t, "end", &format!("disarmed at {place}"));
+                outln!("disarmed at {place}");
+            }
+            Err(e) => log.line(t, "end", &format!("error: {e}")),
+        }
+    }
+
     /// Executes commands until the end of input, `quit`, ctrl-C, the idle timeout or a fault.
     fn execute_input(&mut self, log: &mut Log) -> Outcome {
         let interactive = std::io::stdin().is_terminal();
