@@ -146,46 +146,27 @@ fn assemble(
             out,
         );
     }
-    let check = keys.surface_check.map(|check| match check {
-        Some(check) => check
-            .touching(press, root.at("surface_check"), out)
-            .map(Some),
-        None => Some(None),
+    let surface_check = declared(keys.surface_check, |check| {
+        check.touching(press, root.at("surface_check"), out)
     });
-
-    let stop = match keys.stop {
-        Some(Some(stop)) => roles
-            .as_deref()
-            .and_then(|roles| stop.declare(roles, root.at("stop"), evaluation, out))
-            .map(Some),
-        Some(None) => Some(None),
-        None => None,
-    };
-
-    let online = match keys.online {
-        Some(Some(online)) => roles
-            .as_deref()
-            .and_then(|roles| online.online(roles, root.at("online"), out))
-            .map(Some),
-        Some(None) => Some(None),
-        None => None,
-    };
+    let stop = declared(keys.stop, |stop| {
+        stop.declare(roles.as_deref()?, root.at("stop"), evaluation, out)
+    });
+    let online = declared(keys.online, |online| {
+        online.online(roles.as_deref()?, root.at("online"), out)
+    });
 
     let (path_kind, locations) = path?;
     let (depths_mm, roles, outline) = (depths_mm?, roles?, outline?);
     let scene = keys.scene?.scene(outline.centre);
-    let calibrate_at = match keys.calibrate_at? {
-        Some(keys) => {
-            let cameras = scene
-                .cameras
-                .map_or(StereoGeometry::PAPER, |cameras| StereoGeometry { cameras });
-            let field = root.at("calibrate_at");
-            Some(keys.choose(&locations, &roles, &cameras, field, out)?)
-        }
-        None => None,
-    };
-    let sync = keys.sync?.map(|keys| sync(&keys, outline, &depths_mm));
-    let sync = sync.map_or(Some(None), |sync| sync.map(Some))?;
+    let calibrate_at = declared(keys.calibrate_at, |keys| {
+        let cameras = scene
+            .cameras
+            .map_or(StereoGeometry::PAPER, |cameras| StereoGeometry { cameras });
+        let field = root.at("calibrate_at");
+        keys.choose(&locations, &roles, &cameras, field, out)
+    })?;
+    let sync = declared(keys.sync, |keys| sync(&keys, outline, &depths_mm))?;
     let presses = locations.len() as u64 * depths_mm.len() as u64 * roles.len() as u64
         + sync.as_ref().map_or(0, |s: &Sync| u64::from(s.count));
     // The last number that a mark can carry tests the trigger line.
@@ -237,7 +218,7 @@ fn assemble(
             },
         },
         retakes: keys.retakes?,
-        surface_check: check??,
+        surface_check: surface_check?,
         suspend: keys.suspend?,
         stop: stop?,
         online: online?,
@@ -248,6 +229,17 @@ fn assemble(
         cameras: keys.cameras?.requests(),
         key_places: crate::findings::places(root, &out.sources),
     })
+}
+
+/// Evaluates an optional part: `None` if it could not be read or evaluated, `Some(None)` if it is absent.
+fn declared<T, U>(
+    part: Option<Option<T>>,
+    evaluate: impl FnOnce(T) -> Option<U>,
+) -> Option<Option<U>> {
+    match part? {
+        Some(keys) => evaluate(keys).map(Some),
+        None => Some(None),
+    }
 }
 
 /// Checks that no press and no sync press is deeper than the limit.
