@@ -3,8 +3,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use skinrig_model::{
-    CameraId, InterruptionKind, InterruptionReason, MissedReason, NotAtRest, PressFault, Record,
-    RunEnd, RunFault, StopReason,
+    CameraId, HostTime, InterruptionKind, InterruptionReason, MissedReason, NotAtRest, PressFault,
+    Record, RunEnd, RunFault, StopReason,
 };
 
 use super::Executor;
@@ -48,29 +48,7 @@ impl Executor<'_> {
     pub(super) fn conclude(&mut self, result: Result<(), Halt>) -> RunReport {
         let at = catch_unwind(AssertUnwindSafe(|| self.now())).ok();
         self.journal.begin_ending();
-        let (mut end, interruption) = match result {
-            Ok(()) => (RunEnd::Completed, None),
-            // The interruption was recorded when the operator requested it.
-            Err(Halt::Stopped) => (RunEnd::Stopped(self.stop_reason()), None),
-            Err(Halt::Aborted) => {
-                self.machine.fire(Event::Abort);
-                (
-                    RunEnd::Stopped(StopReason::Abort),
-                    Some(InterruptionKind::Abort),
-                )
-            }
-            // Handled below, where the motors are switched off.
-            Err(Halt::Halted) => (RunEnd::Stopped(StopReason::Halt), None),
-            Err(Halt::PausedNow) => {
-                self.machine.fire(Event::Fault);
-                let lost = RunFault::Internal("no motion handled a pause".to_owned());
-                (RunEnd::fault(lost), Some(InterruptionKind::Fault))
-            }
-            Err(Halt::Fault(e)) => {
-                self.machine.fire(Event::Fault);
-                (RunEnd::fault(e), Some(InterruptionKind::Fault))
-            }
-        };
+        let (mut end, interruption) = self.end_of(result);
 
         let (retracted, disarmed) = self.make_safe();
         let first_end = end.clone();
@@ -91,20 +69,7 @@ impl Executor<'_> {
 
         let t = at.unwrap_or_else(|| self.indenter.position().map(|p| p.t).unwrap_or_default());
         let ended = catch_unwind(AssertUnwindSafe(|| self.now())).unwrap_or(t);
-        self.attempt("outcome", |executor| {
-            executor.journal.emit_poses()?;
-            if executor.trackers.press().is_some() {
-                executor.close_press(Some(PressFault::RunEnded(end.clone())))?;
-            }
-            executor
-                .journal
-                .miss_the_rest(&MissedReason::RunEnded(end.clone()))
-        });
-        self.attempt("the operator's notes", Self::write_notes);
-        let problems = self.journal.problems().to_vec();
-        for problem in problems {
-            let _ = self.journal.note(ended, format!("while ending: {problem}"));
-        }
+        self.close_records(&end, ended);
         // First the cause of the run's end, then the problems during the end.
         let mut rows = Vec::new();
         rows.extend(interruption.map(|kind| (kind, t, first_end)));
@@ -141,6 +106,51 @@ impl Executor<'_> {
             retracted,
             disarmed,
             problems: self.journal.take_problems(),
+        }
+    }
+
+    /// End of a run with this result, and the interruption to be recorded for it.
+    fn end_of(&mut self, result: Result<(), Halt>) -> (RunEnd, Option<InterruptionKind>) {
+        match result {
+            Ok(()) => (RunEnd::Completed, None),
+            // The interruption was recorded when the operator requested it.
+            Err(Halt::Stopped) => (RunEnd::Stopped(self.stop_reason()), None),
+            Err(Halt::Aborted) => {
+                self.machine.fire(Event::Abort);
+                (
+                    RunEnd::Stopped(StopReason::Abort),
+                    Some(InterruptionKind::Abort),
+                )
+            }
+            // `conclude` records it with the time at which the motors were switched off.
+            Err(Halt::Halted) => (RunEnd::Stopped(StopReason::Halt), None),
+            Err(Halt::PausedNow) => {
+                self.machine.fire(Event::Fault);
+                let lost = RunFault::Internal("no motion handled a pause".to_owned());
+                (RunEnd::fault(lost), Some(InterruptionKind::Fault))
+            }
+            Err(Halt::Fault(e)) => {
+                self.machine.fire(Event::Fault);
+                (RunEnd::fault(e), Some(InterruptionKind::Fault))
+            }
+        }
+    }
+
+    /// Gives the open press and all missed ones their outcomes, and writes the last notes.
+    fn close_records(&mut self, end: &RunEnd, ended: HostTime) {
+        self.attempt("outcome", |executor| {
+            executor.journal.emit_poses()?;
+            if executor.trackers.press().is_some() {
+                executor.close_press(Some(PressFault::RunEnded(end.clone())))?;
+            }
+            executor
+                .journal
+                .miss_the_rest(&MissedReason::RunEnded(end.clone()))
+        });
+        self.attempt("the operator's notes", Self::write_notes);
+        let problems = self.journal.problems().to_vec();
+        for problem in problems {
+            let _ = self.journal.note(ended, format!("while ending: {problem}"));
         }
     }
 
