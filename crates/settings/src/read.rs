@@ -6,7 +6,7 @@ use crate::quantity::{self, Dimension};
 use crate::range::ValueRange;
 use crate::shape::{Key, Need, Shape, Table, Word};
 use crate::source::{Sources, Span};
-use crate::yaml::{Kind, Node, join, quote};
+use crate::yaml::{Entry, Kind, Node, join, quote};
 
 /// Reads `node` as a mapping of `table`. Unreadable entries are absent from the result.
 pub(crate) fn read_table(
@@ -32,94 +32,131 @@ pub(crate) fn read_table(
             return None;
         }
     };
-    let mut values = Vec::with_capacity(table.keys.len());
-    for entry in entries {
-        let key_path = join(path, &entry.key);
-        let Some(key) = table.keys.iter().find(|k| k.name == entry.key) else {
-            let names = table.keys.iter().map(|k| k.name);
-            out.error(entry.key_span, key_path, "unknown key")
-                .expected(key_names(table))
-                .found(quote(&entry.key))
-                .maybe_help(did_you_mean(&entry.key, names));
-            continue;
-        };
-        let place = if matches!(entry.value.kind, Kind::Null) {
-            Node {
-                span: entry.key_span,
-                kind: Kind::Null,
-            }
-        } else {
-            entry.value.clone()
-        };
-        if let Some(field) = read(&place, &key.shape, &key_path, out) {
-            values.push((entry.key.clone(), field));
-        }
-    }
-    let head = head_of(node, out);
-    let is_given = |name: &str| entries.iter().any(|e| e.key == name);
-    // A misspelt key is reported once, as an unknown key.
-    let misspelt = |names: &[&'static str]| {
-        let mut unknown = entries
-            .iter()
-            .filter(|e| !table.keys.iter().any(|k| k.name == e.key));
-        unknown.any(|e| closest(&e.key, names.iter().copied()).is_some())
+    let mapping = Mapping {
+        entries,
+        table,
+        path,
     };
-    for key in table.keys.iter().filter(|k| !is_given(k.name)) {
-        match key.need {
-            Need::Required if !misspelt(&[key.name]) => {
-                out.error(head, join(path, key.name), "a required key is missing")
-                    .expected(format!("`{}`: {}", key.name, expectation(&key.shape)))
-                    .found("no such key")
-                    .help(format!("add `{}`", entry_example(key)));
-            }
-            Need::Required | Need::Optional | Need::AtLeastOne => {}
-            Need::Default(text) => {
-                if let Some(value) = default_value(key, text) {
-                    let field = Field {
-                        span: node.span,
-                        path: join(path, key.name),
-                        ..value
-                    };
-                    values.push((key.name.to_owned(), field));
-                }
-            }
-        }
-    }
-    for group in table.exactly_one {
-        let given_entries: Vec<_> = entries
-            .iter()
-            .filter(|e| group.contains(&e.key.as_str()))
-            .collect();
-        match given_entries.as_slice() {
-            [_] => {}
-            [] if misspelt(group) => {}
-            [] => none_given(table, group, "exactly one", head, path, out),
-            [_, others @ ..] => {
-                for other in others {
-                    out.error(
-                        other.key_span,
-                        join(path, &other.key),
-                        "only one of these keys may be given",
-                    )
-                    .expected(format!("exactly one of {}", one_of(group.iter().copied())))
-                    .found(
-                        one_of(given_entries.iter().map(|e| e.key.as_str()))
-                            .replace(" or ", " and "),
-                    )
-                    .help("remove all but one");
-                }
-            }
-        }
-    }
-    let any: Vec<&'static str> = table.at_least_one().collect();
-    if !any.is_empty() && !any.iter().any(|name| is_given(name)) && !misspelt(&any) {
-        none_given(table, &any, "at least one", head, path, out);
-    }
+    let mut values = mapping.given(out);
+    let head = head_of(node, out);
+    values.extend(mapping.defaults(node.span, head, out));
+    mapping.check_groups(head, out);
     Some(Field {
         span: node.span,
         path: path.to_owned(),
         value: Value::Map(values),
     })
+}
+
+/// Entries of a mapping, and the table of its keys.
+struct Mapping<'a> {
+    entries: &'a [Entry],
+    table: &'static Table,
+    path: &'a str,
+}
+
+impl Mapping<'_> {
+    /// Reads the given entries.
+    fn given(&self, out: &mut Collector) -> Vec<(String, Field)> {
+        let mut values = Vec::with_capacity(self.table.keys.len());
+        for entry in self.entries {
+            let key_path = join(self.path, &entry.key);
+            let Some(key) = self.table.keys.iter().find(|k| k.name == entry.key) else {
+                let names = self.table.keys.iter().map(|k| k.name);
+                out.error(entry.key_span, key_path, "unknown key")
+                    .expected(key_names(self.table))
+                    .found(quote(&entry.key))
+                    .maybe_help(did_you_mean(&entry.key, names));
+                continue;
+            };
+            let place = if matches!(entry.value.kind, Kind::Null) {
+                Node {
+                    span: entry.key_span,
+                    kind: Kind::Null,
+                }
+            } else {
+                entry.value.clone()
+            };
+            if let Some(field) = read(&place, &key.shape, &key_path, out) {
+                values.push((entry.key.clone(), field));
+            }
+        }
+        values
+    }
+
+    /// Defaults of keys that are not given; reports missing required keys.
+    fn defaults(&self, span: Span, head: Span, out: &mut Collector) -> Vec<(String, Field)> {
+        let mut values = Vec::new();
+        for key in self.table.keys.iter().filter(|k| !self.has(k.name)) {
+            match key.need {
+                Need::Required if !self.has_misspelt(&[key.name]) => {
+                    let path = join(self.path, key.name);
+                    out.error(head, path, "a required key is missing")
+                        .expected(format!("`{}`: {}", key.name, expectation(&key.shape)))
+                        .found("no such key")
+                        .help(format!("add `{}`", entry_example(key)));
+                }
+                Need::Required | Need::Optional | Need::AtLeastOne => {}
+                Need::Default(text) => {
+                    if let Some(value) = default_value(key, text) {
+                        let path = join(self.path, key.name);
+                        let field = Field {
+                            span,
+                            path,
+                            ..value
+                        };
+                        values.push((key.name.to_owned(), field));
+                    }
+                }
+            }
+        }
+        values
+    }
+
+    /// Checks the groups of which exactly one or at least one key must be given.
+    fn check_groups(&self, head: Span, out: &mut Collector) {
+        for group in self.table.exactly_one {
+            let given: Vec<_> = self
+                .entries
+                .iter()
+                .filter(|e| group.contains(&e.key.as_str()))
+                .collect();
+            match given.as_slice() {
+                [_] => {}
+                [] if self.has_misspelt(group) => {}
+                [] => none_given(self.table, group, "exactly one", head, self.path, out),
+                [_, others @ ..] => {
+                    let found = one_of(given.iter().map(|e| e.key.as_str()));
+                    let found = found.replace(" or ", " and ");
+                    let expected = format!("exactly one of {}", one_of(group.iter().copied()));
+                    for other in others {
+                        let path = join(self.path, &other.key);
+                        out.error(other.key_span, path, "only one of these keys may be given")
+                            .expected(expected.clone())
+                            .found(found.clone())
+                            .help("remove all but one");
+                    }
+                }
+            }
+        }
+        let any: Vec<&'static str> = self.table.at_least_one().collect();
+        if !any.is_empty() && !any.iter().any(|name| self.has(name)) && !self.has_misspelt(&any) {
+            none_given(self.table, &any, "at least one", head, self.path, out);
+        }
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.entries.iter().any(|e| e.key == name)
+    }
+
+    /// True if an unknown key resembles one of `names`: it was reported as unknown already.
+    fn has_misspelt(&self, names: &[&'static str]) -> bool {
+        let mut unknown = self
+            .entries
+            .iter()
+            .filter(|e| !self.table.keys.iter().any(|k| k.name == e.key));
+        unknown.any(|e| closest(&e.key, names.iter().copied()).is_some())
+    }
 }
 
 /// Reports that no key of a group is given.
