@@ -35,9 +35,11 @@ mod overrides;
 pub mod quantity;
 mod range;
 mod read;
+mod scalar;
 mod setting;
 mod shape;
 mod source;
+mod wording;
 mod yaml;
 
 pub use diagnostic::{Collector, Diagnostic, Diagnostics, Finding, closest, did_you_mean, one_of};
@@ -46,11 +48,11 @@ pub use given::given;
 pub use language::open;
 pub use quantity::Dimension;
 pub use range::ValueRange;
-pub use read::{example, expectation};
 pub use setting::{
     Choice, NumberSpan, Numbers, OutOfRange, Row, Setting, Settings, in_unit, key_path, whole_units,
 };
 pub use shape::{Key, Need, Shape, Table, Word, count_keys, join_keys};
 pub use skinrig_settings_derive::{Choice, Settings};
 pub use source::{Location, Sources, Span};
+pub use wording::{example, expectation};
 pub use yaml::{LARGEST_TEXT, decode, quote};
