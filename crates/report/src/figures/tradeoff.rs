@@ -152,6 +152,9 @@ fn mark(svg: &mut Markup, row: &Row, (x, y): (f64, f64)) {
     svg.close();
 }
 
+/// A phone shows the texts of this figure so many times as large.
+const PHONE_TEXTS: f64 = 1.4;
+
 /// Labels of the choices on a front, below their points where the line leaves room, unless they would overlap.
 fn labels(
     svg: &mut Markup,
@@ -168,7 +171,8 @@ fn labels(
         };
         let text = label(&row.choice);
         let width = 5.9 * text.chars().count() as f64;
-        let from = (px - width / 2.0).clamp(left + 2.0, (right - width).max(left + 2.0));
+        let last = right - PHONE_TEXTS * width;
+        let from = (px - width / 2.0).clamp(left + 2.0, last.max(left + 2.0));
         let free = |y: f64| {
             taken.iter().all(|(a, b, at)| {
                 from > *b + 6.0 || from + width < *a - 6.0 || (y - at).abs() > 12.0
