@@ -10,6 +10,7 @@ use super::finding::finding;
 use super::fixed_pixel;
 use super::observed_press::ObservedPress;
 use super::readings::{MIN_SPREAD_DEG, Path, Reading, ScoredReading};
+use super::rearranged::rearranged_rows;
 use super::resection::{residuals, spread_deg};
 use super::segments::shifted_rest;
 use super::statistics::median;
@@ -61,6 +62,9 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     }
     if path.places < MANY_PLACES {
         return Vec::new();
+    }
+    if let Some(finding) = rearranged(&path, &as_is) {
+        return vec![finding];
     }
     let lost: Vec<CameraId> = CameraId::ALL
         .into_iter()
@@ -159,6 +163,22 @@ fn shifted_later(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> 
         presses: path.presses_seen.len() - rest.from,
     };
     let mut found = finding(Law::CentroidFollowsPosition, fault, camera, evidence);
+    found.invalidates = true;
+    Some(found)
+}
+
+/// Rows of the list in another order, in both streams.
+fn rearranged(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> {
+    let found = rearranged_rows(path, as_is)?;
+    let press = |i: usize| path.presses_seen[i].press;
+    let evidence = Evidence::RearrangedRows {
+        from: press(found.from),
+        to: press(found.to),
+        rows: found.rows,
+        log_odds: found.gain,
+    };
+    let law = Law::CentroidFollowsPosition;
+    let mut found = finding(law, Fault::OrderOfPresses, None, evidence);
     found.invalidates = true;
     Some(found)
 }

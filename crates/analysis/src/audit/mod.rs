@@ -22,6 +22,7 @@ mod observed_press;
 mod order;
 mod pattern;
 mod readings;
+mod rearranged;
 mod recording_gaps;
 mod repetitions;
 mod resection;

@@ -288,7 +288,7 @@ impl<'a> Path<'a> {
     }
 
     /// Consecutive presses of each repetition.
-    fn repetitions(&self) -> Vec<std::ops::Range<usize>> {
+    pub(super) fn repetitions(&self) -> Vec<std::ops::Range<usize>> {
         let mut from = 0;
         let mut all = Vec::new();
         for i in 1..=self.presses_seen.len() {

@@ -94,8 +94,12 @@ pub(super) fn residuals(camera: &CameraModel, pairs: &[(f64, Point2)]) -> Vec<f6
 
 /// Viewing angle of `column` minus that of `at`, degrees within ±180.
 pub(crate) fn residual_deg(camera: &CameraModel, column: f64, at: Point2) -> f64 {
-    let off = camera.angle_of_column_deg(column) - camera.angle_of_point_deg(at);
-    off - 360.0 * (off / 360.0).round()
+    wrapped_deg(camera.angle_of_column_deg(column) - camera.angle_of_point_deg(at))
+}
+
+/// The same angle within ±180, degrees.
+pub(super) fn wrapped_deg(angle: f64) -> f64 {
+    angle - 360.0 * (angle / 360.0).round()
 }
 
 /// Robust standard deviation about 0, degrees.

@@ -381,6 +381,21 @@ pub enum Evidence {
         /// Presses from the first one on.
         presses: usize,
     },
+    /// Some rows of the list are in another order.
+    #[error(
+        "expected columns on the viewing angles of their own presses, found {rows} presses between {from} and {to} at the \
+         positions of other rows of the list: odds of e^{log_odds:.0}"
+    )]
+    RearrangedRows {
+        /// First press of the rows.
+        from: PressId,
+        /// Last press of the rows.
+        to: PressId,
+        /// Rows seen at the position of another row.
+        rows: usize,
+        /// Log odds (natural) against the list as it is.
+        log_odds: f64,
+    },
     /// The columns are unrelated to the order of the list.
     #[error(
         "expected columns on the viewing angles of the presses, found them {} off, no better than in random order, while \

@@ -182,6 +182,11 @@ fn of_positions() -> Vec<(Value, &'static str)> {
              position +2 rows later: odds of e^30 (n 18 presses)",
         ),
         (
+            json!({"kind": "rearranged_rows", "from": 6, "to": 15, "rows": 10, "log_odds": 80.0}),
+            "expected columns on the viewing angles of their own presses, found 10 presses between press 6 and press 15 at \
+             the positions of other rows of the list: odds of e^80",
+        ),
+        (
             json!({"kind": "random_order", "off_deg": [14.0, 13.0], "places": 25}),
             "expected columns on the viewing angles of the presses, found them 14.0 and 13.0 degrees (cameras 1 and 2) off, \
              no better than in random order, while the located presses cover the area of the list (n 25 locations)",

@@ -157,6 +157,24 @@ pub(super) fn rows(t: &mut Table) {
         right_table,
         &order,
     );
+    // The robust fit of the cameras leaves the exchanged rows out.
+    t.papers(
+        "two lines of five exchanged",
+        |s| {
+            import(s, |b| {
+                let (one, two) = b.table[5..15].split_at_mut(5);
+                one.swap_with_slice(two);
+            })
+        },
+        right_table,
+        &order,
+    );
+    t.papers(
+        "ten rows in reverse",
+        |s| import(s, |b| b.table[4..14].reverse()),
+        right_table,
+        &order,
+    );
     t.papers(
         "sorted by y",
         |s| {
