@@ -117,7 +117,7 @@ fn estimates_are_scored_with_regions_and_without() {
     assert!(output["coverage"].is_null());
     // One is not located; of the others, the region holds two.
     let header = "press,x_mm,y_mm,region_major_mm,region_minor_mm,region_angle_deg";
-    let regions = ["4,1,0", "1,4,90", "1,4,0"];
+    let regions = ["4,1,0", "4,1,180", "4,1,90"];
     let mut with: Vec<String> = rows(&truths, 3.0)
         .iter()
         .zip(regions)
@@ -247,6 +247,11 @@ fn a_wrong_table_is_refused_with_its_row() {
     challenge.refuses(
         &table(region, regions),
         &["row 2", "region_major_mm", "above 0"],
+    );
+    let exchanged = good.iter().map(|row| format!("{row},1,4,30"));
+    challenge.refuses(
+        &table(region, exchanged),
+        &["row 2", "region_minor_mm at most region_major_mm (1)", "4"],
     );
     // Answers of another challenge, or changed ones.
     let changed =

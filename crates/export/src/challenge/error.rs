@@ -124,6 +124,18 @@ pub enum EstimateError {
         /// The cell.
         found: f64,
     },
+    /// The angle of a region is that of the longer semi-axis: with the axes exchanged it means another ellipse.
+    #[error(
+        "row {row}: expected region_minor_mm at most region_major_mm ({major_mm}), found {minor_mm}\n  help: region_angle_deg is that of the longer semi-axis, region_major_mm"
+    )]
+    AxesExchanged {
+        /// The row.
+        row: u64,
+        /// The stated longer semi-axis.
+        major_mm: f64,
+        /// The stated shorter one.
+        minor_mm: f64,
+    },
     /// The challenge has no such press.
     #[error("row {row}: the challenge has no press {press}")]
     UnknownPress {

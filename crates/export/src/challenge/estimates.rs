@@ -115,14 +115,27 @@ impl Row<'_> {
         let region = match columns.region {
             None => None,
             Some([major, minor, angle]) => Some(Region {
-                semi_axes_mm: [
-                    self.length(major, REGION[0])?,
-                    self.length(minor, REGION[1])?,
-                ],
+                semi_axes_mm: self.semi_axes_mm(major, minor)?,
                 angle_deg: self.number(angle, REGION[2])?,
             }),
         };
         Ok(Some(Position { at, region }))
+    }
+
+    /// The longer semi-axis, then the shorter one.
+    fn semi_axes_mm(&self, major: usize, minor: usize) -> Result<[f64; 2], EstimateError> {
+        let [major_mm, minor_mm] = [
+            self.length(major, REGION[0])?,
+            self.length(minor, REGION[1])?,
+        ];
+        if minor_mm > major_mm {
+            return Err(EstimateError::AxesExchanged {
+                row: self.number,
+                major_mm,
+                minor_mm,
+            });
+        }
+        Ok([major_mm, minor_mm])
     }
 
     fn length(&self, at: usize, column: &'static str) -> Result<f64, EstimateError> {

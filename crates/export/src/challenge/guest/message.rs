@@ -146,6 +146,12 @@ pub(super) fn position(line: &str, press: u32) -> Result<Option<Position>, Guest
             shown(line)
         )));
     }
+    if region.is_some_and(|r| r.semi_axes_mm[0] < r.semi_axes_mm[1]) {
+        return Err(refused(format!(
+            "a `minor_mm` above `major_mm`, whose angle is stated: {}",
+            shown(line)
+        )));
+    }
     Ok(Some(Position { at, region }))
 }
 
@@ -182,6 +188,10 @@ mod tests {
             (
                 r#"{"press":3,"x_mm":1,"y_mm":2,"region":{"major_mm":0,"minor_mm":1,"angle_deg":0}}"#,
                 "above 0 mm",
+            ),
+            (
+                r#"{"press":3,"x_mm":1,"y_mm":2,"region":{"major_mm":1,"minor_mm":2,"angle_deg":30}}"#,
+                "`minor_mm` above `major_mm`",
             ),
         ] {
             let text = read(line).unwrap_err().to_string();
