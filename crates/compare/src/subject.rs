@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::Analysis;
+use skinrig_analysis::result::PressView;
 use skinrig_model::SkinOutline;
 
 /// Everything known about a session besides its results.
@@ -55,17 +56,42 @@ pub struct Subject {
 }
 
 impl SessionFacts {
-    /// True if both hold the same bytes, imported or replayed twice.
-    pub(crate) fn is_same_recording(&self, other: &Self) -> bool {
-        let fewer = self.chunks.len().min(other.chunks.len());
-        let shared = self.chunks.intersection(&other.chunks).count();
-        fewer > 0 && 2 * shared > fewer
+    /// True if both hold the same bytes.
+    fn has_same_chunks(&self, other: &Self) -> bool {
+        mostly_shared(&self.chunks, &other.chunks)
     }
 
-    /// True if a simulation made it. Simulations of the same seed are alike; that has a check of its own.
+    /// True if a simulation made it. Skins simulated with the same seed are alike; that has a check of its own.
     pub(crate) fn is_simulated(&self) -> bool {
         self.origin.as_deref() == Some("simulated")
     }
+}
+
+impl Session {
+    /// True if both are of one recording, imported, replayed or simulated twice. Another file format or origin of time changes
+    /// every byte, but not the events of the presses.
+    pub(crate) fn is_same_recording(&self, other: &Self) -> bool {
+        self.facts.has_same_chunks(&other.facts)
+            || mostly_shared(&self.press_events(), &other.press_events())
+    }
+
+    /// What identifies the events of each press that both cameras saw: their number, and the bits of the centroids.
+    fn press_events(&self) -> BTreeSet<[(u32, u32, u64, u64); 2]> {
+        let of = |view: &PressView| {
+            let [u, v] = [view.centroid_u?, view.centroid_v?].map(f64::to_bits);
+            Some((view.on_events, view.cluster_events, u, v))
+        };
+        let presses = self.analysis.presses.iter();
+        presses
+            .filter_map(|p| Some([of(p.views[0].as_ref()?)?, of(p.views[1].as_ref()?)?]))
+            .collect()
+    }
+}
+
+/// True if both share more than half of what the smaller one has.
+fn mostly_shared<T: Ord>(one: &BTreeSet<T>, other: &BTreeSet<T>) -> bool {
+    let fewer = one.len().min(other.len());
+    fewer > 0 && 2 * one.intersection(other).count() > fewer
 }
 
 impl Subject {

@@ -321,6 +321,13 @@ fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
         page.contains("data-testid=\"despite\""),
         "not on the first screen"
     );
+    // A simulation repeated with its seed is no second session of the skin.
+    let repeated = record(&lab, "again", "1", &[]);
+    std::fs::copy(repeated, lab.path("a/again.session.sqlite")).unwrap();
+    let other = record(&lab, "d", "4", &[]);
+    skinrig(&["compare", &lab.text("a"), &other])
+        .code(2)
+        .expect_stderr(&["same-session", "simulated twice", "is twice on one side"]);
     let other_level = record(&lab, "c", "3", &["--level", "kinematic"]);
     skinrig(&["compare", &a, &other_level])
         .code(2)

@@ -251,23 +251,26 @@ fn check_locations(subjects: &[Subject], locations: &Locations) -> Option<Differ
 fn check_duplicates(subjects: &[Subject]) -> Option<Difference> {
     let all = || {
         let sides = subjects.iter().enumerate();
-        sides.flat_map(|(side, s)| s.sessions.iter().map(move |s| (side, &s.facts)))
+        sides.flat_map(|(side, s)| s.sessions.iter().map(move |s| (side, s)))
     };
     // Sides of each pair of sessions with the same recording.
     let mut pairs = Vec::new();
     for (k, (side, a)) in all().enumerate() {
-        let later = all().skip(k + 1);
-        let same = later.filter(|(_, b)| {
-            a.session_id == b.session_id || (!a.is_simulated() && a.is_same_recording(b))
-        });
-        pairs.extend(same.map(|(other, b)| (side != other, a.session_id == b.session_id)));
+        for (other, b) in all().skip(k + 1) {
+            let same_id = a.facts.session_id == b.facts.session_id;
+            // Two skins may be simulated with the same noise; a second press of one skin may not.
+            let may_repeat = side != other && a.facts.is_simulated();
+            if same_id || (!may_repeat && a.is_same_recording(b)) {
+                pairs.push((side != other, same_id));
+            }
+        }
     }
     let (between_sides, same_id) = *pairs.iter().max()?;
     let values = each(subjects, |s| s.facts.session_id.chars().take(8).collect());
     let what = if same_id {
         "the same session, or a copy of it,"
     } else {
-        "the same recording, imported or replayed twice,"
+        "the same recording, imported, replayed or simulated twice,"
     };
     let place = if between_sides {
         "is on both sides"
