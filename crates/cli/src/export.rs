@@ -62,7 +62,7 @@ fn export_one(
     target: &Target,
     is_bundle: bool,
 ) -> Result<(Folder, Vec<PathBuf>, Option<Failure>), Failure> {
-    let reader = SessionReader::open(&target.path).map_err(Failure::session)?;
+    let reader = SessionReader::open_checked(&target.path).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
     let folder = folder(args, target, if is_bundle { ".bundle" } else { ".export" })?;
     let (written, invalid) = if is_bundle {

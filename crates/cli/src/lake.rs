@@ -98,7 +98,7 @@ fn files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 }
 
 fn add(lake: &Lake, path: &Path) -> Result<Added, Failure> {
-    let reader = SessionReader::open(path).map_err(Failure::session)?;
+    let reader = SessionReader::open_checked(path).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
     let Some(seal) = reader.seal().map_err(Failure::session)? else {
         return Ok(Added::LeftOut("it is not sealed".to_owned()));

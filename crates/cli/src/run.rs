@@ -385,7 +385,7 @@ fn replay(
     command_line: &str,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
-    let reader = SessionReader::open(recording).map_err(Failure::session)?;
+    let reader = SessionReader::open_checked(recording).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
     // A replay repeats one run of the plan on the recorded clocks; a further leg starts in the middle of the plan.
     let legs = reader.legs().map_err(Failure::session)?.len();

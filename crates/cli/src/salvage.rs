@@ -27,15 +27,20 @@ pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
         outln!("\n{}", to.display());
     }
     if report.is_whole() {
-        Ok(Exit::Ok)
-    } else {
-        Err(Failure::limit(format!(
-            "{}: some data are lost, as listed\n  next: `skinrig show {}` and `skinrig analyze` work on what was recovered; \
-             keep the damaged file",
-            args.session.display(),
-            to.display()
-        )))
+        return Ok(Exit::Ok);
     }
+    let (session, to) = (args.session.display(), to.display());
+    Err(Failure::limit(match &report.changed[..] {
+        [] => format!(
+            "{session}: some data are lost, as listed\n  next: `skinrig show {to}` and `skinrig analyze` work on what was \
+             recovered; keep the damaged file"
+        ),
+        tables => format!(
+            "{session}: values in {} are not those that were recorded, and it is unknown which\n  next: restore the session from \
+             a copy; use no results of {to}",
+            tables.join(", ")
+        ),
+    }))
 }
 
 fn print(report: &SalvageReport) {

@@ -169,7 +169,7 @@ impl Session {
     #[new]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         py.detach(|| {
-            let reader = SessionReader::open(&path)?;
+            let reader = SessionReader::open_checked(&path)?;
             Ok(Self {
                 header: reader.header()?,
                 session_id: reader.session_id()?,

@@ -3,8 +3,7 @@
 use sqlx::Row;
 use sqlx::sqlite::SqliteConnection;
 
-use crate::digest::{EarlierState, TableDigest, digest_earlier, tree_hash};
-use crate::from_row::digest_from;
+use crate::digest::{EarlierState, TableDigest, digest_earlier, digest_from, tree_hash};
 use crate::hex::hex;
 use crate::problem::Problem;
 use crate::query::{Fault, each_row, has_table, int, num, opt_int, sha};

@@ -4,7 +4,7 @@ use sha2::{Digest, Sha256};
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Row, TypeInfo, ValueRef};
 
-use crate::query::{Fault, each_row, has_table};
+use crate::query::{Fault, each_row, has_table, int, sha, text};
 
 /// A table under the tree hash. For camera bytes and poses, the hash covers the SHA-256 column beside the blob.
 struct Table {
@@ -213,6 +213,27 @@ struct Extent(i64, i64, [i64; 2]);
 /// eight little-endian bytes of value; for text and blobs, eight bytes of length and the content.
 pub(crate) async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
     digest_tables_beside(conn, None).await
+}
+
+/// A row of `table_digest` or `previous_table_digest`.
+pub(crate) fn digest_from(row: &SqliteRow) -> Result<TableDigest, Fault> {
+    Ok(TableDigest {
+        name: text(row, "name")?,
+        rows: int(row, "rows")?,
+        sha256: sha(row, "sha256")?,
+    })
+}
+
+/// Digests of the tables as they were sealed.
+pub(crate) async fn sealed_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
+    let mut recorded = Vec::new();
+    let query = sqlx::query("SELECT name, rows, sha256 FROM table_digest");
+    each_row(query, conn, |row| {
+        recorded.push(digest_from(row)?);
+        Ok(())
+    })
+    .await?;
+    Ok(recorded)
 }
 
 /// Like [`digest_tables`], with the digest of one table if it is already known.

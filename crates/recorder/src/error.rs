@@ -58,6 +58,15 @@ pub enum RecorderError {
         /// The file.
         path: PathBuf,
     },
+    /// The rows of a sealed session are not those that were sealed.
+    #[error("{}: expected the rows that were sealed, found others in {}: the file was changed or damaged after it was recorded; \
+        `skinrig verify` lists the differences; restore the file from a copy", path.display(), tables.join(", "))]
+    Changed {
+        /// The session file.
+        path: PathBuf,
+        /// The tables.
+        tables: Vec<String>,
+    },
     /// The session to resume fails verification. Nothing in it was changed.
     #[error("{}: expected a sound session to resume, found {} problem(s): {}; nothing was changed: `skinrig salvage` copies \
         the intact parts into a new session", path.display(), problems.len() as u64 + more_problems, join(problems))]

@@ -9,7 +9,6 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use crate::cause::verdict_from;
-use crate::digest::TableDigest;
 use crate::pose;
 use crate::query::{
     Fault, enum_value, int, num, opt_int, opt_num, opt_real, real, real_if_present, sha, text,
@@ -61,15 +60,6 @@ pub(crate) fn planned_from(row: &SqliteRow) -> Result<PlannedPress, Fault> {
         location: LocationId::from_index(num(row, "location")?),
         at: Point2::new(real(row, "x_mm")?, real(row, "y_mm")?),
         depth_mm: real(row, "depth_mm")?,
-    })
-}
-
-/// A row of `table_digest` or `previous_table_digest`.
-pub(crate) fn digest_from(row: &SqliteRow) -> Result<TableDigest, Fault> {
-    Ok(TableDigest {
-        name: text(row, "name")?,
-        rows: int(row, "rows")?,
-        sha256: sha(row, "sha256")?,
     })
 }
 

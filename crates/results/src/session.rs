@@ -37,7 +37,7 @@ impl Session {
     /// # Errors
     /// [`ResultsError`] for a file that is not a readable session, and for settings that do not parse.
     pub fn open(path: &Path, options: AnalysisOptions<'_>) -> Result<Self, ResultsError> {
-        let reader = SessionReader::open(path)?;
+        let reader = SessionReader::open_checked(path)?;
         let header = reader.header()?;
         let rig: RigDocument =
             serde_json::from_str(&header.rig_json).map_err(|source| ResultsError::Rig {

@@ -53,7 +53,7 @@ struct EventFile {
 
 impl EventFile {
     fn open(session: &Path) -> Result<Self, Failure> {
-        let reader = SessionReader::open(session).map_err(Failure::session)?;
+        let reader = SessionReader::open_checked(session).map_err(Failure::session)?;
         let header = reader.header().map_err(Failure::session)?;
         let index = |camera: CameraId| {
             let format = header.stream_formats[camera.index()];

@@ -146,7 +146,7 @@ fn session(
 ) -> Result<(Session, Option<SelectedResult>), Failure> {
     let Target { path, selected } = target;
     let unreadable = Failure::session;
-    let reader = SessionReader::open(path).map_err(unreadable)?;
+    let reader = SessionReader::open_checked(path).map_err(unreadable)?;
     let header = reader.header().map_err(unreadable)?;
     let facts = facts(path, &reader, &header)?;
     let variant = name

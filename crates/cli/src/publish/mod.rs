@@ -196,7 +196,7 @@ fn one_session(
     target: &Target,
     stem: &str,
 ) -> Result<(SessionNumbers, Published), Failure> {
-    let reader = SessionReader::open(&target.path).map_err(Failure::session)?;
+    let reader = SessionReader::open_checked(&target.path).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
     let bundle = format!("{stem}.bundle");
     let folder = Folder::new(&out.join(&bundle), stem, false).map_err(export::refused)?;

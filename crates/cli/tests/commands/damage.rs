@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::catalogue::change;
-use crate::support::{Lab, SeededRandom, text};
-use crate::support::{ProgramOutput, skinrig};
+use crate::support::{Lab, ProgramOutput, SeededRandom, read_json, skinrig, text};
 
 /// Records a small sealed session; returns its path and bytes.
 fn sealed_session(lab: &Lab) -> (PathBuf, Vec<u8>) {
@@ -114,8 +113,20 @@ fn measured_positions_that_the_poses_contradict_are_reported() {
     assert_ne!(skinrig(&["resume", &path]).code, Some(0));
 }
 
-/// Runs every reading command on `file`: each must exit with an expected code, without a panic.
-fn run_all_readers(lab: &Lab, file: &Path) -> ProgramOutput {
+/// RMSE of the results at `path`, mm.
+fn rmse_mm(path: &str) -> serde_json::Value {
+    read_json(Path::new(path))["summary"]["rmse_mm"].clone()
+}
+
+fn analyzed_rmse_mm(lab: &Lab, session: &Path) -> serde_json::Value {
+    let out = lab.text("sound.json");
+    skinrig(&["analyze", &text(session), "--out", &out]).code(0);
+    rmse_mm(&out)
+}
+
+/// Runs every reading command on `file`: each must exit with an expected code, without a panic, and no analysis gives another error
+/// than that of the sound session.
+fn run_all_readers(lab: &Lab, file: &Path, sound: &serde_json::Value) -> ProgramOutput {
     let file = text(file);
     let out = lab.text("other.json");
     for arguments in [
@@ -131,6 +142,9 @@ fn run_all_readers(lab: &Lab, file: &Path) -> ProgramOutput {
             !output.err.contains("panicked"),
             "{arguments:?}: {output:#?}"
         );
+        if arguments[0] == "analyze" && output.code == Some(0) {
+            assert_eq!(&rmse_mm(&out), sound, "{output:#?}");
+        }
     }
     skinrig(&["verify", &file])
 }
@@ -142,6 +156,7 @@ fn flipped_bytes_are_found() {
     let file = lab.path("damaged.session.sqlite");
     std::fs::write(&file, &good).unwrap();
     skinrig(&["verify", &text(&file)]).code(0);
+    let sound = analyzed_rmse_mm(&lab, &file);
     let mut random = SeededRandom(20);
     for round in 0..24 {
         let mut bytes = good.clone();
@@ -155,7 +170,7 @@ fn flipped_bytes_are_found() {
         let flip = 1 + random.below(255) as u8;
         bytes[at] ^= flip;
         std::fs::write(&file, &bytes).unwrap();
-        let output = run_all_readers(&lab, &file);
+        let output = run_all_readers(&lab, &file, &sound);
         assert!(
             !output.err.contains("panicked"),
             "byte {at} ^ {flip:#04x}: {output:#?}"
@@ -173,9 +188,11 @@ fn a_torn_session_is_found() {
     let lab = Lab::new();
     let (_, good) = sealed_session(&lab);
     let file = lab.path("torn.session.sqlite");
+    std::fs::write(&file, &good).unwrap();
+    let sound = analyzed_rmse_mm(&lab, &file);
     for length in [0, 50, 100, 4_096, good.len() / 2, good.len() - 1] {
         std::fs::write(&file, &good[..length]).unwrap();
-        let output = run_all_readers(&lab, &file);
+        let output = run_all_readers(&lab, &file, &sound);
         assert!(
             !output.err.contains("panicked"),
             "{length} bytes: {output:#?}"

@@ -5,7 +5,7 @@ use skinrig_model::{HostTime, PoseSample};
 use super::SessionReader;
 use crate::error::RecorderError;
 use crate::from_row::pose_block_from;
-use crate::query::num;
+use crate::query::{Fault, num};
 
 /// Uses the index over the blocks' end times: a long session has thousands of blocks between its chunks.
 const BLOCK_ENDING_AFTER: &str = EXPLAINED.split_at(EXPLAIN.len()).1;
@@ -55,7 +55,15 @@ impl SessionReader {
                 .bind(to.0)
                 .fetch_optional(conn)
                 .await?;
-            row.map(|row| pose_block_from(&row)).transpose()
+            let found = row.map(|row| pose_block_from(&row)).transpose()?;
+            let Some((block, samples)) = found else {
+                return Ok(None);
+            };
+            // In a damaged file, the search may find an earlier block again and again.
+            match samples.last() {
+                Some(last) if (last.t, block) <= (end, id) => Err(misplaced(block)),
+                _ => Ok(Some((block, samples))),
+            }
         })
     }
 
@@ -84,7 +92,10 @@ impl SessionReader {
             .bind(after)
             .fetch_optional(conn)
             .await?;
-            row.map(|row| pose_block_from(&row)).transpose()
+            match row.map(|row| pose_block_from(&row)).transpose()? {
+                Some((block, _)) if block <= after => Err(misplaced(block)),
+                found => Ok(found),
+            }
         })
     }
 
@@ -98,6 +109,11 @@ impl SessionReader {
         self.for_each_pose_block(from, to, |block| poses.extend_from_slice(block))?;
         Ok(poses)
     }
+}
+
+fn misplaced(block: i64) -> Fault {
+    let place = format!("pose block {block}");
+    Fault::bad(place, "blocks in order", "it after a later one")
 }
 
 #[cfg(test)]

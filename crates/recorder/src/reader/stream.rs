@@ -107,6 +107,11 @@ impl SessionReader {
         let Some((meta, stored)) = found else {
             return Ok(None);
         };
+        // In a damaged file, the search may find an earlier chunk again and again.
+        if meta.seq < seq {
+            let place = format!("{camera} chunk {}", meta.seq);
+            return Err(self.damaged(place, "chunks in order", "it after a later one".into()));
+        }
         let mut buffer = Vec::new();
         self.unpack(&meta, &stored, &mut buffer)?;
         let bytes = match meta.codec {

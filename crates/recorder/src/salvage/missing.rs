@@ -26,14 +26,22 @@ impl SalvageWriter<'_> {
             if row.get(2) == Some(&Value::Blob(digest.sha256.to_vec())) {
                 continue;
             }
-            let rows = match row.get(1) {
-                Some(Value::Int(n)) => n.to_string(),
-                _ => "unknown".to_owned(),
+            let name = &digest.name;
+            let found = match row.get(1) {
+                // As many rows, and not the same ones: which values are wrong is unknown.
+                Some(Value::Int(n)) if *n == digest.rows => {
+                    self.report.changed.push(name.clone());
+                    format!(
+                        "table {name}: expected the {n} rows that were sealed, found as many with other values"
+                    )
+                }
+                Some(Value::Int(n)) => format!(
+                    "table {name}: expected the {n} rows that were sealed, found {} rows",
+                    digest.rows
+                ),
+                _ => format!("table {name}: expected the rows that were sealed, found others"),
             };
-            self.report.findings.push(format!(
-                "table {}: expected the {rows} rows that were sealed, found {} rows or different values",
-                digest.name, digest.rows
-            ));
+            self.report.findings.push(found);
         }
         Ok(())
     }

@@ -16,6 +16,8 @@ pub struct SalvageReport {
     pub lost: Vec<LostBytes>,
     /// Other damage.
     pub findings: Vec<String>,
+    /// Tables with all rows, of which some have other values than those that were sealed.
+    pub changed: Vec<String>,
     /// Lower-case hex SHA-256 of the damaged file.
     pub source_sha256: String,
 }

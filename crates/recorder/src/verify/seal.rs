@@ -4,11 +4,10 @@ use std::path::Path;
 use std::sync::mpsc::Receiver;
 
 use super::report::VerifyReport;
-use crate::digest::{TableDigest, digest_tables_beside, tree_hash};
-use crate::from_row::digest_from;
+use crate::digest::{TableDigest, digest_tables_beside, sealed_tables, tree_hash};
 use crate::hex::hex;
 use crate::lock::WriterLock;
-use crate::query::{each_row, num};
+use crate::query::num;
 use crate::reader::SessionReader;
 use crate::seal::{self, Stamp};
 
@@ -28,13 +27,7 @@ pub(super) fn check(
     }
     let mut stamp = None;
     let read = reader.query("checking the seal", async |conn| {
-        let mut recorded = Vec::new();
-        let query = sqlx::query("SELECT name, rows, sha256 FROM table_digest");
-        each_row(query, conn, |row| {
-            recorded.push(digest_from(row)?);
-            Ok(())
-        })
-        .await?;
+        let recorded = sealed_tables(conn).await?;
         let page = seal::seal_page(conn).await;
         // Before the digests: another thread reads the largest of these tables meanwhile.
         if let Ok(page) = page {

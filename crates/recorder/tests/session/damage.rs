@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::{Evt2, header, outcome, sealed, sha};
+use crate::common::{Evt2, change, header, outcome, sealed, sha, with_file};
 use skinrig_model::{AttemptId, CameraId, HostTime, PressId, PressVerdict, Record};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter, list, verify};
 
@@ -52,6 +52,78 @@ fn check(original: &[u8], offsets: impl Iterator<Item = usize>, bit: impl Fn(usi
         }
         bytes[offset] = original[offset];
     }
+}
+
+/// The root of a table points to its other pages: after a change, a search may find one of them again and again.
+#[test]
+fn a_page_that_points_elsewhere_ends_the_reading() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    sealed(&path, 450);
+    let original = std::fs::read(&path).unwrap();
+    for table in ["pose_block", "chunk"] {
+        let root = with_file(&path, async |conn| {
+            let sql = "SELECT rootpage FROM sqlite_schema WHERE name = ?";
+            let page = sqlx::query_scalar::<_, i64>(sql).bind(table);
+            page.fetch_one(conn).await.unwrap() as usize
+        });
+        // sqlite.org/fileformat.html section 1.6: an interior page of a table, its last child, and offsets of cells that begin with
+        // the others; page numbers are big-endian.
+        let page = (root - 1) * PAGE;
+        assert_eq!(original[page], 5, "{table} has a single page");
+        let cell = |n: usize| {
+            let at = page + 12 + 2 * n;
+            page + usize::from(u16::from_be_bytes([original[at], original[at + 1]]))
+        };
+        let children = [cell(0), cell(1), page + 8];
+        for bit in 0..4 {
+            let low_bytes = children.iter().map(|at| at + 3);
+            check(&original, low_bytes, |_| 1 << bit);
+        }
+    }
+}
+
+/// A sealed session whose rows changed gives no results; it can still be looked at.
+#[test]
+fn changed_rows_of_a_sealed_session_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    sealed(&path, 4);
+    SessionReader::open_checked(&path).unwrap();
+    let writable = |path: &Path| {
+        let mut permissions = std::fs::metadata(path).unwrap().permissions();
+        #[allow(clippy::permissions_set_readonly_false)]
+        permissions.set_readonly(false);
+        std::fs::set_permissions(path, permissions).unwrap();
+    };
+    writable(&path);
+    for (n, (statement, table)) in [
+        (
+            "UPDATE attempt SET measured_x_mm = measured_x_mm + 1 WHERE press = 1",
+            "attempt",
+        ),
+        ("UPDATE press SET role = 'calibrate' WHERE id = 2", "press"),
+        (
+            "UPDATE chunk SET host_ns = host_ns + 1 WHERE seq = 0",
+            "chunk",
+        ),
+        ("UPDATE seal SET tree_sha256 = zeroblob(32)", "seal"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let changed = folder.path().join(format!("{n}.session.sqlite"));
+        std::fs::copy(&path, &changed).unwrap();
+        change(&changed, &[statement]);
+        SessionReader::open(&changed).unwrap().presses().unwrap();
+        match SessionReader::open_checked(&changed) {
+            Err(RecorderError::Changed { tables, .. }) => assert_eq!(tables, [table]),
+            other => panic!("{statement}: {other:?}"),
+        }
+    }
+    // A session that was never sealed has nothing to compare with.
+    change(&path, &["DELETE FROM seal"]);
+    SessionReader::open_checked(&path).unwrap();
 }
 
 #[test]
