@@ -35,6 +35,16 @@ impl StreamFormat {
             Self::Evt3 => "evt3",
         }
     }
+
+    /// Length of a word, bytes.
+    #[must_use]
+    pub const fn word_bytes(self) -> usize {
+        match self {
+            Self::Evt2 => 4,
+            Self::Evt21 | Self::Evt21Legacy => 8,
+            Self::Evt3 => 2,
+        }
+    }
 }
 
 impl fmt::Display for StreamFormat {

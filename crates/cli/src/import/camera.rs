@@ -21,6 +21,8 @@ use skinrig_sim::SimClock;
 const CHUNK_BYTES: usize = 1 << 20;
 /// Or when it spans this much camera time, µs: shorter than any press, so that bytes arrive during each press.
 const CHUNK_SPAN_US: u64 = 400_000;
+/// Bytes of a file that are scanned at once; a multiple of all words.
+const PIECE_BYTES: usize = 1 << 14;
 /// Chunks that may wait between the reading thread and the run.
 const QUEUE: usize = 4;
 /// A camera may have been started this long after the schedule's begin, µs; its file then ends as much earlier.
@@ -51,16 +53,19 @@ pub(crate) enum RecordingError {
     },
     /// The stream ends within a word.
     #[error(
-        "{}: expected whole words of {word} bytes, found {rest} bytes after the last one: the file is cut off",
+        "{0}: expected whole words of {word} bytes, found {rest} bytes after the last one: the file is cut off\n  next: copy it \
+         again; if that is all of it, `truncate --size {whole} {0}` leaves the whole words",
         path.display()
     )]
     CutOff {
         /// The file.
         path: PathBuf,
         /// Bytes per word.
-        word: usize,
+        word: u64,
         /// Bytes after the last whole word.
-        rest: usize,
+        rest: u64,
+        /// Bytes of the file up to its end.
+        whole: u64,
     },
 }
 
@@ -74,10 +79,39 @@ type QueuedChunk = Result<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>), RecordingErro
 /// Input side of the queue, used by the reading thread.
 pub(crate) struct ChunkFeed {
     queue: SyncSender<QueuedChunk>,
+    format: StreamFormat,
     scanner: Scanner,
     encoder: Option<evt2::Encoder>,
-    bytes: Vec<u8>,
+    open: OpenChunk,
+    /// Begin of the open chunk of encoded events.
     chunk_from_us: u64,
+}
+
+/// The chunk that is being filled.
+#[derive(Default)]
+struct OpenChunk {
+    bytes: Vec<u8>,
+    /// Bytes of them that were scanned.
+    scanned: usize,
+    /// What was found in these.
+    facts: ChunkFacts,
+    triggers: Vec<TriggerEdge>,
+}
+
+impl OpenChunk {
+    /// Scans the rest.
+    fn scan(&mut self, scanner: &mut Scanner) {
+        let (facts, triggers) = scanner.push(&self.bytes[self.scanned..]);
+        self.scanned = self.bytes.len();
+        self.facts = ChunkFacts {
+            cd_events: self.facts.cd_events + facts.cd_events,
+            on_events: self.facts.on_events + facts.on_events,
+            trigger_edges: self.facts.trigger_edges + facts.trigger_edges,
+            first_us: self.facts.first_us.or(facts.first_us),
+            last_us: facts.last_us.or(self.facts.last_us),
+        };
+        self.triggers.extend(triggers);
+    }
 }
 
 /// The run ended before the file, so reading stops.
@@ -105,7 +139,7 @@ impl ChunkFeed {
                 if let Some(Err(e)) = self
                     .encoder
                     .as_mut()
-                    .map(|x| x.advance_to(end, &mut self.bytes))
+                    .map(|x| x.advance_to(end, &mut self.open.bytes))
                 {
                     return self.fail(e.into());
                 }
@@ -118,10 +152,14 @@ impl ChunkFeed {
                 y: event.y.min(evt2::MAX_COORDINATE),
                 ..*event
             };
-            if let Some(Err(e)) = self.encoder.as_mut().map(|x| x.cd(event, &mut self.bytes)) {
+            if let Some(Err(e)) = self
+                .encoder
+                .as_mut()
+                .map(|x| x.cd(event, &mut self.open.bytes))
+            {
                 return self.fail(e.into());
             }
-            if self.bytes.len() >= CHUNK_BYTES {
+            if self.open.bytes.len() >= CHUNK_BYTES {
                 self.send()?;
                 self.chunk_from_us = event.t_us;
             }
@@ -129,17 +167,43 @@ impl ChunkFeed {
         Ok(())
     }
 
-    /// Takes the next bytes of a stream that is recorded unchanged.
+    /// Takes the next bytes of a stream that is recorded unchanged; a whole number of words, but for the last ones.
     ///
     /// # Errors
     /// [`ImportEnded`].
     pub(super) fn raw(&mut self, bytes: &[u8]) -> Result<(), ImportEnded> {
-        self.bytes.extend_from_slice(bytes);
-        if self.bytes.len() >= CHUNK_BYTES {
-            self.send()
-        } else {
-            Ok(())
+        for piece in bytes.chunks(PIECE_BYTES) {
+            self.piece(piece)?;
         }
+        Ok(())
+    }
+
+    /// Takes bytes into the open chunk, or into a new one if that would span too much time. A file without events has no time words
+    /// either if another program wrote it: few bytes may then span minutes.
+    fn piece(&mut self, bytes: &[u8]) -> Result<(), ImportEnded> {
+        let (facts, _) = self.scanner.clone().push(bytes);
+        let is_long = |first_us: Option<u64>| {
+            let span_us = facts
+                .last_us
+                .zip(first_us)
+                .map(|(b, a)| b.saturating_sub(a));
+            span_us.is_some_and(|us| us >= CHUNK_SPAN_US)
+        };
+        let word = self.format.word_bytes();
+        if is_long(facts.first_us) && bytes.len() > word {
+            let (one, two) = bytes.split_at((bytes.len() / 2).next_multiple_of(word));
+            self.piece(one)?;
+            return self.piece(two);
+        }
+        if is_long(self.open.facts.first_us) {
+            self.send()?;
+        }
+        self.open.bytes.extend_from_slice(bytes);
+        self.open.scan(&mut self.scanner);
+        if self.open.bytes.len() >= CHUNK_BYTES {
+            self.send()?;
+        }
+        Ok(())
     }
 
     /// Ends the stream with an error.
@@ -152,13 +216,13 @@ impl ChunkFeed {
     }
 
     fn send(&mut self) -> Result<(), ImportEnded> {
-        if self.bytes.is_empty() {
+        if self.open.bytes.is_empty() {
             return Ok(());
         }
-        let bytes = std::mem::take(&mut self.bytes);
-        let (facts, triggers) = self.scanner.push(&bytes);
+        self.open.scan(&mut self.scanner);
+        let chunk = std::mem::take(&mut self.open);
         self.queue
-            .send(Ok((bytes, facts, triggers)))
+            .send(Ok((chunk.bytes, chunk.facts, chunk.triggers)))
             .map_err(|_| ImportEnded)
     }
 }
@@ -197,9 +261,10 @@ impl FileCamera {
             .spawn(move || {
                 let mut feed = ChunkFeed {
                     queue: sender,
+                    format,
                     scanner: Scanner::new(format),
                     encoder: None,
-                    bytes: Vec::new(),
+                    open: OpenChunk::default(),
                     chunk_from_us: 0,
                 };
                 let _ = match read(&mut feed) {

@@ -286,6 +286,7 @@ fn open(
         FileKind::Raw => {
             let reader = RawReader::open(&path).map_err(Failure::input)?;
             let format = reader.header().format;
+            check_words(&path, &reader).map_err(Failure::input)?;
             about["header"] = serde_json::json!(reader.header().entries);
             let identity = identity("recorded file (Prophesee RAW, bytes as recorded)");
             FileCamera::new(camera, identity, format, clock.clone(), move |feed| {
@@ -320,31 +321,28 @@ fn read_hdf5(
     }
 }
 
-fn read_raw(path: &Path, feed: &mut ChunkFeed) -> Result<(), RecordingError> {
-    let mut reader = RawReader::open(path)?;
-    let word = match reader.header().format {
-        StreamFormat::Evt2 => 4,
-        StreamFormat::Evt21 | StreamFormat::Evt21Legacy => 8,
-        StreamFormat::Evt3 => 2,
-    };
-    let mut total = 0;
-    loop {
-        let bytes = reader.next_chunk()?;
-        total += bytes.len();
-        if bytes.is_empty() {
-            break;
-        }
-        if feed.raw(bytes).is_err() {
-            return Ok(());
-        }
-    }
-    match (total, total % word) {
-        (0, _) => Err(RecordingError::NoWords { path: path.into() }),
-        (_, 0) => Ok(()),
-        (_, rest) => Err(RecordingError::CutOff {
+/// Rejects a stream without words, and one that ends within a word.
+fn check_words(path: &Path, reader: &RawReader) -> Result<(), RecordingError> {
+    let header = reader.header();
+    let word = header.format.word_bytes() as u64;
+    match reader.stream_bytes()? {
+        0 => Err(RecordingError::NoWords { path: path.into() }),
+        stream if stream % word == 0 => Ok(()),
+        stream => Err(RecordingError::CutOff {
             path: path.into(),
             word,
-            rest,
+            rest: stream % word,
+            whole: header.length + stream - stream % word,
         }),
+    }
+}
+
+fn read_raw(path: &Path, feed: &mut ChunkFeed) -> Result<(), RecordingError> {
+    let mut reader = RawReader::open(path)?;
+    loop {
+        let bytes = reader.next_chunk()?;
+        if bytes.is_empty() || feed.raw(bytes).is_err() {
+            return Ok(());
+        }
     }
 }

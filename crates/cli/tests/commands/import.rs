@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use skinrig_formats::Decoder;
-use skinrig_model::{CameraId, Point2, StreamFormat};
+use skinrig_formats::hdf5::EventWriter;
+use skinrig_model::{CameraId, CdEvent, Point2, PressVerdict, StreamFormat};
+use skinrig_recorder::SessionReader;
 
 use crate::dataset::{DRIFT_PPM, Dataset, OFFSET_US, PRESSES, csv, events, positions};
 use crate::replay::assert_replays;
@@ -80,6 +82,24 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
             "on both sides",
             "--despite same-session",
         ]);
+
+    // Nor is it with another origin of time, which changes every byte.
+    for (camera, path) in CameraId::ALL.into_iter().zip(&data.cameras) {
+        let late = |e: CdEvent| CdEvent {
+            t_us: e.t_us + 5_000_000,
+            ..e
+        };
+        std::fs::remove_file(path).unwrap();
+        let mut writer = EventWriter::create(path, 0).unwrap();
+        let later: Vec<CdEvent> = events(camera).into_iter().map(late).collect();
+        writer.append(&later).unwrap();
+        writer.finish().unwrap();
+    }
+    skinrig(&data.arguments(&lab.path("later"))).code(0);
+    let later = text(&only(&lab.path("later"), ".session.sqlite"));
+    skinrig(&["compare", &text(&session), &later])
+        .code(2)
+        .expect_stderr(&["the same recording", "on both sides"]);
 }
 
 /// Imports the dataset with changed positions or swapped cameras; returns output and results.
@@ -223,6 +243,15 @@ fn recordings_as_raw_files_are_imported_byte_for_byte() {
             "{camera}"
         );
     }
+    // The same presses, too: bytes of a quiet camera arrive during each of them.
+    let verdicts = |session: &Path| {
+        let presses = SessionReader::open(session).unwrap().presses().unwrap();
+        let attempts = presses.into_iter().flat_map(|(_, attempts)| attempts);
+        attempts
+            .map(|a| a.outcome.map(|o| o.verdict))
+            .collect::<Vec<Option<PressVerdict>>>()
+    };
+    assert_eq!(verdicts(&first), verdicts(&second));
 }
 
 /// Imports a sample in the published layout from beside the workspace; `None` if absent.

@@ -57,6 +57,15 @@ impl RawReader {
         Decoder::with_geometry(self.header.format, geometry)
     }
 
+    /// Length of the stream after the header, bytes.
+    ///
+    /// # Errors
+    /// [`FormatsError::Io`].
+    pub fn stream_bytes(&self) -> Result<u64, FormatsError> {
+        let metadata = self.file.metadata().map_err(FormatsError::io(&self.path))?;
+        Ok(metadata.len().saturating_sub(self.header.length))
+    }
+
     /// The next bytes of the stream, at most 256 KiB; an empty slice at the end. Words may be split between
     /// two pieces.
     ///
