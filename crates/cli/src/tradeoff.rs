@@ -10,6 +10,7 @@ use skinrig_analysis::tradeoff::{
     Cost, Measured, Plan, Predicted, Prediction, Predictions, Progress, Requirement, Row,
     Selection, Tradeoff, Unselected, measure,
 };
+use skinrig_catalogue::results_digest;
 use skinrig_model::RunHeader;
 use skinrig_report::tradeoff::{Rows, label, page, protocol_lines, terminal_table};
 use skinrig_results::Origin;
@@ -144,10 +145,19 @@ fn print_recommendation(
     }
     outln!("");
     if !row.overrides.is_empty() {
-        protocol_lines(row)
+        lines_on_top(row, own)
             .lines()
             .for_each(|line| outln!("  {line}"));
         outln!("");
+    }
+}
+
+/// The protocol lines of a row, which change the settings of the measurement: not always those of the session.
+fn lines_on_top(row: &Row, own: Option<&str>) -> String {
+    let lines = protocol_lines(row);
+    match own {
+        Some(own) if !lines.is_empty() => format!("# on top of {own}\n{lines}"),
+        _ => lines,
     }
 }
 
@@ -288,6 +298,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         other => Failure::input(other),
     })?;
     let recommendations = recommendations(&measured, args);
+    let own = variant.as_ref().map(Variant::changes_with_selection);
     let result = &measured.tradeoff;
     let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "session": identity, "rig": rig, "variant": variant, "machine": machine(), "tradeoff": result });
     let found = recommendations.iter().map(|a| {
@@ -298,7 +309,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
             "choice": row.map(|r| label(&r.choice)),
             "row": row,
             "confirmed_mm": found.map(|f| f.confirmed_mm),
-            "protocol": row.map(protocol_lines),
+            "protocol": row.map(|row| lines_on_top(row, own.as_deref())),
         })
     });
     document["answers"] = serde_json::Value::Array(found.collect());
@@ -308,6 +319,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         .unwrap_or_else(|| tradeoff_path(&target.path, variant.as_ref().map(|v| v.name.as_str())));
     let json_path = html_path.with_extension("json");
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
+    let text = results_digest::with_digest(&text);
     let html = page(result, &file_name(&target.path), &rig);
     write(&html_path, html.as_bytes())?;
     write(&json_path, text.as_bytes())?;
@@ -315,7 +327,6 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         document["files"] = serde_json::json!({ "page": html_path, "results": json_path });
         crate::terminal::print_json(&document);
     } else {
-        let own = variant.as_ref().map(Variant::changes_with_selection);
         recommendations
             .iter()
             .for_each(|a| print_recommendation(a, own.as_deref(), &result.predictions));

@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::tradeoff::Tradeoff;
+use skinrig_catalogue::results_digest::{self, DigestError};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::analyses::tradeoff_path;
 
 /// Values of the document's `format` and `format_version`.
-pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 4);
+pub(crate) const FORMAT: (&str, u32) = ("skinrig-tradeoff", 5);
 
 /// The session of the results, as it was.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -49,6 +50,21 @@ pub enum TradeoffFileError {
         path: PathBuf,
         /// Error of the parser.
         source: serde_json::Error,
+    },
+    /// The file was changed after it was written.
+    #[error(
+        "{}: expected the digest of its content at its end, found {}; next: `skinrig tradeoff` rewrites it",
+        path.display(),
+        match source {
+            DigestError::Missing => "none",
+            DigestError::Differs => "that of another content",
+        }
+    )]
+    Changed {
+        /// The file.
+        path: PathBuf,
+        /// What its digest is.
+        source: DigestError,
     },
     /// The results are not of this session as it is.
     #[error(
@@ -96,10 +112,13 @@ pub(crate) fn beside_session(
     };
     Some(match serde_json::from_str::<Document>(&text) {
         Err(source) => Err(TradeoffFileError::Parse { path, source }),
-        Ok(d) if (d.format.as_str(), d.format_version) == FORMAT => match d.session == *identity {
-            true => Ok(d.tradeoff),
-            false => Err(TradeoffFileError::OtherSession { path }),
-        },
+        Ok(d) if (d.format.as_str(), d.format_version) == FORMAT => {
+            match results_digest::check(text.as_bytes()) {
+                Err(source) => Err(TradeoffFileError::Changed { path, source }),
+                Ok(()) if d.session != *identity => Err(TradeoffFileError::OtherSession { path }),
+                Ok(()) => Ok(d.tradeoff),
+            }
+        }
         Ok(d) => Err(TradeoffFileError::Version {
             path,
             format: d.format,

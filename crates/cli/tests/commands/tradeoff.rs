@@ -178,7 +178,12 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
     let page = own["files"]["page"].as_str().unwrap().to_owned();
     let before = std::fs::read(&page).unwrap();
     let set = ["--set", "analysis.estimator=column_median"];
-    let other = trade(&set).code(0).json();
+    let other = trade(&[&set[..], &["--budget", "10s"]].concat())
+        .code(0)
+        .json();
+    let lines = other["answers"][0]["protocol"].as_str().unwrap();
+    let expected = "# on top of analysis.estimator=column_median\nanalysis:\n";
+    assert!(lines.starts_with(expected), "{lines}");
     assert_ne!(other["files"]["page"], own["files"]["page"]);
     assert_eq!(
         other["variant"]["changed"][0],
@@ -198,6 +203,16 @@ fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
     let report = std::fs::read_to_string(only(&lab.path("t"), ".report.html")).unwrap();
     assert!(!report.contains("Error against cost"));
     assert!(report.contains("found that of another one"), "no reason");
+    // Nor is it with an edited figure.
+    let edited = std::fs::read_to_string(json).unwrap();
+    let edited = edited.replacen("\"value\": ", "\"value\": 1", 1);
+    std::fs::write(json, edited).unwrap();
+    skinrig(&["report", &session]).code(0);
+    let report = std::fs::read_to_string(only(&lab.path("s"), ".report.html")).unwrap();
+    assert!(
+        report.contains("found that of another content"),
+        "no reason"
+    );
     trade(&[&set[..], &["--out", &page]].concat())
         .code(2)
         .expect_stderr(&["--out"]);
