@@ -48,11 +48,16 @@ pub(crate) fn whole(
             .found(format!("\"{text}\""))
             .help("remove the quotes"),
         Err(_) => {
+            let is_unit = |rest: &str| {
+                !rest.is_empty()
+                    && rest
+                        .chars()
+                        .all(|c| c.is_alphabetic() || "%/°²".contains(c))
+            };
             let help = match quantity::split_number(text) {
-                (Some(n), rest) if !rest.is_empty() && n.fract() == 0.0 => {
+                (Some(n), rest) if is_unit(rest.trim()) && n.fract() == 0.0 => {
                     Some(format!("counts have no unit: write `{n}`"))
                 }
-                (Some(_), "") => None,
                 _ => None,
             };
             out.error(node.span, path, "not a whole number")

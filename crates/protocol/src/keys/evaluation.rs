@@ -30,9 +30,10 @@ pub(crate) fn roles(field: &Field, count: u32, out: &mut Collector) -> Option<Ve
         for numbers in &numbers.0 {
             if numbers.last > count {
                 out.error(numbers.span, path, "there is no such repetition")
-                    .expected(format!(
-                        "1 to {count}: there are {count} repetitions, counted from 1"
-                    ))
+                    .expected(match count {
+                        1 => "1: there is one repetition".to_owned(),
+                        _ => format!("1 to {count}: there are {count} repetitions, counted from 1"),
+                    })
                     .found(numbers.last.to_string());
                 clean = false;
             }

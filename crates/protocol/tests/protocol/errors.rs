@@ -204,6 +204,28 @@ fn impossible_values_across_keys() {
     );
 }
 
+/// A help that is another number than the author's would be worse than none.
+#[test]
+fn other_ways_to_write_a_number_get_no_wrong_help() {
+    for (seed, help) in [
+        ("0x10", None),
+        ("1_000", None),
+        ("1,000", None),
+        ("3 presses", Some("write `3`")),
+    ] {
+        let text = shipped("demo.yaml");
+        assert!(text.contains("seed: 1\n"));
+        let text = text.replacen("seed: 1\n", &format!("seed: {seed}\n"), 1);
+        let error = parse(&text, &[]).unwrap_err();
+        let found = &error.list()[0];
+        assert_eq!(found.path, "seed", "{error}");
+        match help {
+            None => assert_eq!(found.help, None, "{error}"),
+            Some(help) => assert!(found.help.as_ref().unwrap().contains(help), "{error}"),
+        }
+    }
+}
+
 #[test]
 fn marks_must_not_overlap() {
     let error = parse(
