@@ -58,6 +58,20 @@ struct ReadFile {
     entry: Result<SessionEntry, RecorderError>,
 }
 
+/// Why tags and notes of a session were not replaced.
+#[derive(Debug, thiserror::Error)]
+enum NotAnnotated {
+    /// The session cannot be read.
+    #[error(transparent)]
+    Session(RecorderError),
+    /// Its tags cannot be read.
+    #[error("{0}")]
+    Tags(String),
+    /// It was never registered.
+    #[error("not in the catalogue: register it first")]
+    Unknown,
+}
+
 impl Catalogue {
     /// Opens a catalogue; waits up to `wait` for another program that writes it.
     ///
@@ -170,25 +184,29 @@ impl Catalogue {
         for path in sessions {
             let name = path.file_name().unwrap_or_default();
             let file = name.to_string_lossy().into_owned();
-            let reason = match entry::read(path, &[]) {
-                Err(e) => Some(e.to_string()),
-                Ok(entry) => match entry.tags_problem.clone() {
-                    Some(problem) => Some(problem),
-                    None => {
-                        let is_known = self
-                            .transaction("registering tags and notes", async |db| {
-                                write::annotate(db, &entry).await
-                            })?;
-                        (!is_known).then(|| "not in the catalogue: register it first".to_owned())
-                    }
-                },
-            };
-            match reason {
-                None => done.registered.push(file),
-                Some(reason) => done.unreadable.push(Unreadable { file, reason }),
+            match self.annotate(path)? {
+                Ok(()) => done.registered.push(file),
+                Err(reason) => done.unreadable.push(Unreadable {
+                    file,
+                    reason: reason.to_string(),
+                }),
             }
         }
         Ok(done)
+    }
+
+    /// Replaces the tags and notes of one session, or tells why not.
+    fn annotate(&mut self, path: &Path) -> Result<Result<(), NotAnnotated>, CatalogueError> {
+        let entry = match entry::read(path, &[]) {
+            Ok(entry) => entry,
+            Err(e) => return Ok(Err(NotAnnotated::Session(e))),
+        };
+        if let Some(problem) = &entry.tags_problem {
+            return Ok(Err(NotAnnotated::Tags(problem.clone())));
+        }
+        let doing = "registering tags and notes";
+        let is_known = self.transaction(doing, async |db| write::annotate(db, &entry).await)?;
+        Ok(is_known.then_some(()).ok_or(NotAnnotated::Unknown))
     }
 
     /// Registers sessions that the caller has read, each with the name of its file in the catalogue's folder, in one transaction.

@@ -38,7 +38,7 @@ pub enum CatalogueError {
     },
     /// The user of a server may not do this.
     #[error(
-        "{place}: {doing}: {found}; ask an administrator for the role that allows it (`skinrig catalogue roles --help` lists them)"
+        "{place}: {doing}: {found}; ask an administrator for the role that allows it; `skinrig catalogue roles --help` lists the roles"
     )]
     Denied {
         /// The catalogue, without a password.

@@ -58,6 +58,33 @@ impl Catalogue {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::schema::MIGRATIONS;
+
+    #[test]
+    fn every_table_of_the_schema_has_its_rights() {
+        let sql = include_str!("roles.sql");
+        let granted = |begin: &str, role: &str| {
+            let (_, rest) = sql.split_once(begin).unwrap();
+            let (names, _) = rest.split_once(role).unwrap();
+            names
+                .split([',', ' ', '\n'])
+                .filter(|w| !w.is_empty())
+                .collect::<Vec<_>>()
+        };
+        let read = granted("GRANT SELECT ON", "TO skinrig_read");
+        let write = granted("GRANT INSERT, UPDATE, DELETE ON", "TO skinrig_record");
+        let schema = MIGRATIONS.map(|(.., sql)| sql).concat();
+        let tables = schema.split("CREATE TABLE ").skip(1);
+        let tables: Vec<&str> = tables
+            .filter_map(|rest| rest.split_whitespace().next())
+            .collect();
+        assert!(tables.len() > 15, "{tables:?}");
+        for table in tables {
+            assert!(read.contains(&table) && write.contains(&table), "{table}");
+            let owner = format!("ALTER TABLE {table} OWNER TO skinrig_admin;");
+            assert!(sql.contains(&owner), "{table}");
+        }
+    }
 
     #[test]
     fn the_statements_create_these_roles() {

@@ -6,7 +6,7 @@ use sqlx::{Connection, SqlSafeStr};
 use crate::db::Db;
 
 /// All migrations, oldest first: version, description and SQL.
-const MIGRATIONS: [(i64, &str, &str); 2] = [
+pub(crate) const MIGRATIONS: [(i64, &str, &str); 2] = [
     (
         20261127000000,
         "catalogue",
