@@ -20,7 +20,7 @@ fn run_until_killed(folder: &std::path::Path, fault: &str) -> bool {
         None => true,
         code => {
             let text = super::lab::output_text(&output);
-            let is_over = text.contains(&format!("the run, which is over without {fault}"));
+            let is_over = text.contains(&format!("the run ended without {fault}"));
             assert!(code == Some(2) && is_over, "{text}");
             false
         }

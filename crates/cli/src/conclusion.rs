@@ -61,8 +61,8 @@ pub(crate) fn close(
 fn faults_missed(faults: &[PlantedFault], session: &Path) -> Failure {
     let names: Vec<String> = faults.iter().map(ToString::to_string).collect();
     Failure::input(format!(
-        "expected every injected fault to occur during the run, which is over without {}\n  the session is kept: {}\n  next: \
-         give times that the run reaches; `skinrig plan` lists its presses",
+        "expected every injected fault to occur, but the run ended without {}\n  the session is kept: {}\n  next: choose \
+         times that the run reaches; `skinrig plan` lists its presses",
         names.join(", "),
         session.display()
     ))

@@ -10,9 +10,6 @@ use skinrig_report::Summary;
 
 use super::{content_of, results_path};
 
-/// The summary is within this many bytes of the end of a results file.
-const TAIL_BYTES: usize = 1 << 16;
-
 /// Why the results of an analysis beside a session cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SummaryError {
@@ -55,7 +52,7 @@ pub(crate) enum SummaryError {
     Io(#[from] io::Error),
 }
 
-/// Reads the summary of an analysis from the last bytes of its results. Rejects results of another session or analysis.
+/// Reads the summary of an analysis from the end of its results. Rejects results of another session or analysis.
 ///
 /// # Errors
 /// [`SummaryError`] when the results are missing, unreadable, or of another session or analysis.
@@ -92,11 +89,10 @@ fn read_summary(path: &Path) -> Result<Summary, SummaryError> {
         _ => e.into(),
     })?;
     results_digest::check(&text)?;
-    let tail = &text[text.len().saturating_sub(TAIL_BYTES)..];
     // A key of the outermost object: a JSON string never contains a line break.
     let key = b"\n  \"summary\": ";
-    let at = tail.windows(key.len()).position(|w| w == key);
-    let text = &tail[at.ok_or(SummaryError::Older(None))? + key.len()..];
+    let at = text.windows(key.len()).rposition(|w| w == key);
+    let text = &text[at.ok_or(SummaryError::Older(None))? + key.len()..];
     let mut reader = serde_json::Deserializer::from_slice(text);
     Summary::deserialize(&mut reader).map_err(|e| SummaryError::Older(Some(e)))
 }

@@ -16,7 +16,7 @@ use skinrig_model::{CameraId, HostTime, PoseSample, StreamFormat};
 use skinrig_online::{
     Decoders, Detection, Estimate, Felt, Live, SkinModel, StreamSettings, Training,
 };
-use skinrig_recorder::SessionReader;
+use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_results::AlignedSession;
 
 use crate::analysis_request::AnalysisRequest;
@@ -35,7 +35,7 @@ pub(crate) use offline::Compared;
 use offline::Comparison;
 use summary::{Felts, Quantiles, Sighting, words};
 
-/// A pose this far from a time still tells where the tip was: robots report at 1 kHz, and the tip moves 0.1 mm meanwhile, ns.
+/// Largest distance in time of the pose that gives the depth at an instant, ns: at 20 mm/s the tip moves 0.1 mm meanwhile.
 const POSE_NS: f64 = 5e6;
 
 /// Times of a replay.
@@ -219,7 +219,7 @@ fn print(skin: &SkinModel, stop: StopRule, felts: &Felts, replay: &Replay, rig: 
     let depth = match depth.n {
         0 => String::new(),
         _ => format!(
-            "; tip {} mm deep by then, p99 {} mm",
+            "; tip then {} mm deep (p99 {} mm)",
             number(depth.median, 2),
             number(depth.p99, 2)
         ),
@@ -279,13 +279,13 @@ fn print(skin: &SkinModel, stop: StopRule, felts: &Felts, replay: &Replay, rig: 
 }
 
 /// Depth of the measured tip at a time of the host, mm; `None` without poses around it.
-fn tip_depth_mm(reader: &SessionReader, host_us: f64) -> Option<f64> {
+fn tip_depth_mm(reader: &SessionReader, host_us: f64) -> Result<Option<f64>, RecorderError> {
     let at = |ns: f64| HostTime(ns as i64);
     let (from, to) = (host_us * 1e3 - POSE_NS, host_us * 1e3 + POSE_NS);
-    let poses = reader.poses(at(from), at(to)).ok()?;
+    let poses = reader.poses(at(from), at(to))?;
     let distance = |t: HostTime| (t.0 as f64 - host_us * 1e3).abs();
     let near = |a: &&PoseSample, b: &&PoseSample| distance(a.t).total_cmp(&distance(b.t));
-    Some(-poses.iter().min_by(near)?.measured.z_mm)
+    Ok(poses.iter().min_by(near).map(|pose| -pose.measured.z_mm))
 }
 
 /// Opens a session that can be replayed, with its analysis.
@@ -376,7 +376,8 @@ pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
         args.stop_at,
         replay.until_us,
         |us| tip_depth_mm(&reader, us),
-    );
+    )
+    .map_err(Failure::session)?;
     if output.json {
         let mut summary = json!({ "summary": {
             "rig": header.rig_name, "threshold": skin.threshold(), "places": skin.places(),

@@ -4,6 +4,7 @@ use serde::Serialize;
 use skinrig_analysis::Analysis;
 use skinrig_analysis::metrics::quantile;
 use skinrig_online::{Detection, DetectionScore, Felt, Position, ScoredPress};
+use skinrig_recorder::RecorderError;
 
 use crate::args::StopRule;
 
@@ -96,8 +97,8 @@ impl Felts {
         sightings: &[Sighting],
         stop: StopRule,
         until_us: i64,
-        tip_depth_mm: impl Fn(f64) -> Option<f64>,
-    ) -> Self {
+        tip_depth_mm: impl Fn(f64) -> Result<Option<f64>, RecorderError>,
+    ) -> Result<Self, RecorderError> {
         let (presses, outside): (Vec<ScoredPress>, Vec<ScoredPress>) = ScoredPress::of(analysis)
             .into_iter()
             .partition(|p| p.release_us + 100e3 < until_us as f64);
@@ -107,7 +108,8 @@ impl Felts {
             Some(press.contact_us + delay_ms * 1e3)
         };
         let felt_us = score.delays_ms.iter().filter_map(felt_us);
-        let depths_mm = felt_us.filter_map(tip_depth_mm).collect();
+        let depths_mm = felt_us.filter_map(|us| tip_depth_mm(us).transpose());
+        let depths_mm: Vec<f64> = depths_mm.collect::<Result<_, _>>()?;
         let of_press = |press: &ScoredPress| {
             let range = press.contact_us - 1e3..press.release_us;
             let onset = found
@@ -122,7 +124,7 @@ impl Felts {
             .collect();
         let first = |s: &[Sighting]| s.iter().find(|s| is_met(stop, s)).copied();
         let last = |s: &[Sighting]| s.iter().rfind(|s| s.position.location.is_some()).copied();
-        Self {
+        Ok(Self {
             presses: presses.len(),
             outside: outside.len(),
             felt: score.delays_ms.len(),
@@ -137,7 +139,7 @@ impl Felts {
             at_stop: at(analysis, &seen, first),
             at_end: at(analysis, &seen, last),
             held: held(analysis, &seen),
-        }
+        })
     }
 }
 

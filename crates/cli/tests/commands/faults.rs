@@ -74,7 +74,7 @@ fn a_run_without_one_of_its_faults_fails_and_names_it() {
         let ended = skinrig(&run).code(2);
         let session = text(&only(&folder, ".session.sqlite"));
         ended.expect_stderr(&[
-            &format!("the run, which is over without {never}\n"),
+            &format!("the run ended without {never}\n"),
             &format!("the session is kept: {session}"),
         ]);
         skinrig(&["verify", &session]).code(0);
