@@ -13,8 +13,9 @@ const ATTEMPTS: u32 = 6;
 /// Failures that count, while this machine kept up as far as one thread can tell: threads of the drivers work more and may be delayed
 /// when it is not. A defect fails again.
 const FAILURES: u32 = 2;
-/// The drivers allow their devices a tenth of a second (`docs/reference/runs.md`); several threads take part in each step.
-const LATE: Duration = Duration::from_millis(25);
+/// The drivers allow their devices a tenth of a second (`docs/reference/runs.md`); several threads take part in each step, and each
+/// may be late several times as long as the gauge.
+const LATE: Duration = Duration::from_millis(10);
 /// Pause of the gauge between two readings, and its work in each.
 const REST: Duration = Duration::from_millis(10);
 const WORK: Duration = Duration::from_micros(500);

@@ -13,11 +13,16 @@ use super::sensor::Gates;
 use crate::config::Pacing;
 use crate::content::Source;
 use crate::random::Splitmix;
-use crate::world::Edge;
+use crate::world::{Edge, now_ns};
 use skinrig_sim::scene::PixelEvent;
 
 /// Interval at which waits check whether the run has ended.
 const MAX_WAIT: Duration = Duration::from_millis(5);
+
+/// Delay of this program above which it is catching up, ns.
+const LATE_NS: i64 = 2_000_000;
+/// Delay above which it no longer waits for the host, ns.
+const TOO_LATE_NS: i64 = 250_000_000;
 
 /// Event interval of a hot pixel, ns.
 const HOT_EVERY_NS: i64 = 1_000_000;
@@ -86,7 +91,7 @@ impl<'a> Producer<'a> {
         while let Some(before) = self.camera.gates(self.run.number) {
             let until_ns = self.made_ns + i64::from(before.packet_us) * 1_000;
             let due = match config.pacing {
-                Pacing::RealTime => world.wait_until(until_ns, MAX_WAIT),
+                Pacing::RealTime => world.wait_until(until_ns, MAX_WAIT) && self.has_room(until_ns),
                 Pacing::HostTime => queues.wait_for_room(config.fifo_bytes, MAX_WAIT),
             };
             // Register writes in the meantime affect this packet.
@@ -94,6 +99,14 @@ impl<'a> Producer<'a> {
                 self.packet(until_ns, &gates);
             }
         }
+    }
+
+    /// False while the host has to make room for packets that this program sends late: it catches up in a burst, which no camera makes.
+    fn has_room(&self, until_ns: i64) -> bool {
+        let Evk1 { config, queues, .. } = self.camera;
+        let late_ns = now_ns() - until_ns;
+        !(LATE_NS..TOO_LATE_NS).contains(&late_ns)
+            || queues.wait_for_room(config.fifo_bytes / 2, MAX_WAIT)
     }
 
     /// Generates everything up to `until_ns` as one packet.
