@@ -74,6 +74,9 @@ impl ValueRange {
             format!(" {unit}")
         };
         let low = if self.above { "more than" } else { "at least" };
-        format!("{low} {}{unit} and at most {}{unit}", self.min, self.max)
+        // Without the rounding of a change of units.
+        let round = |limit: f64| format!("{limit:.11e}").parse().unwrap_or(limit);
+        let (min, max): (f64, f64) = (round(self.min), round(self.max));
+        format!("{low} {min}{unit} and at most {max}{unit}")
     }
 }

@@ -227,6 +227,13 @@ fn other_ways_to_write_a_number_get_no_wrong_help() {
 }
 
 #[test]
+fn limits_are_written_as_they_were_set() {
+    let set = ["analysis.window_after_contact=0 ms"];
+    let error = parse(&shipped("demo.yaml"), &set).unwrap_err().to_string();
+    assert!(error.contains("at least 0.000000001 s and"), "{error}");
+}
+
+#[test]
 fn marks_must_not_overlap() {
     let error = parse(
         &shipped("demo.yaml"),
