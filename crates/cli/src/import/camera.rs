@@ -178,8 +178,8 @@ impl ChunkFeed {
         Ok(())
     }
 
-    /// Takes bytes into the open chunk, or into a new one if that would span too much time. A file without events has no time words
-    /// either if another program wrote it: few bytes may then span minutes.
+    /// Takes bytes into the open chunk, or into a new one if that would span too much time. A file that another program wrote may have
+    /// no time words between its events: few bytes then span minutes.
     fn piece(&mut self, bytes: &[u8]) -> Result<(), ImportEnded> {
         let (facts, _) = self.scanner.clone().push(bytes);
         let is_long = |first_us: Option<u64>| {
