@@ -19,7 +19,7 @@ fn next(state: &mut u64) -> u64 {
     z ^ (z >> 31)
 }
 
-fn writable(path: &Path) {
+pub(crate) fn writable(path: &Path) {
     let mut permissions = std::fs::metadata(path).unwrap().permissions();
     #[expect(clippy::permissions_set_readonly_false, reason = "a file of this test")]
     permissions.set_readonly(false);

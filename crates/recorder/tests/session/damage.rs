@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::chain::writable;
 use crate::common::{Evt2, change, header, outcome, sealed, sha, with_file};
 use skinrig_model::{AttemptId, CameraId, HostTime, PressId, PressVerdict, Record};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter, list, verify};
@@ -90,12 +91,6 @@ fn changed_rows_of_a_sealed_session_are_refused() {
     let path = folder.path().join("a.session.sqlite");
     sealed(&path, 4);
     SessionReader::open_checked(&path).unwrap();
-    let writable = |path: &Path| {
-        let mut permissions = std::fs::metadata(path).unwrap().permissions();
-        #[allow(clippy::permissions_set_readonly_false)]
-        permissions.set_readonly(false);
-        std::fs::set_permissions(path, permissions).unwrap();
-    };
     writable(&path);
     for (n, (statement, table)) in [
         (
