@@ -54,7 +54,7 @@ pub(crate) enum RecordingError {
     /// The stream ends within a word.
     #[error(
         "{0}: expected whole words of {word} bytes, found {rest} bytes after the last one: the file is cut off\n  next: copy it \
-         again; if that is all of it, `truncate --size {whole} {0}` leaves the whole words",
+         again; if that is all of it, `truncate --size {whole} \"{0}\"` leaves the whole words",
         path.display()
     )]
     CutOff {

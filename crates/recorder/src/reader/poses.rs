@@ -113,7 +113,7 @@ impl SessionReader {
 
 fn misplaced(block: i64) -> Fault {
     let place = format!("pose block {block}");
-    Fault::bad(place, "blocks in order", "it after a later one")
+    Fault::bad(place, "blocks in order", "this one after a later one")
 }
 
 #[cfg(test)]

@@ -110,7 +110,11 @@ impl SessionReader {
         // In a damaged file, the search may find an earlier chunk again and again.
         if meta.seq < seq {
             let place = format!("{camera} chunk {}", meta.seq);
-            return Err(self.damaged(place, "chunks in order", "it after a later one".into()));
+            return Err(self.damaged(
+                place,
+                "chunks in order",
+                "this one after a later one".into(),
+            ));
         }
         let mut buffer = Vec::new();
         self.unpack(&meta, &stored, &mut buffer)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::chain::writable;
 use crate::common::{Evt2, change, header, outcome, sealed, sha, with_file};
 use skinrig_model::{AttemptId, CameraId, HostTime, PressId, PressVerdict, Record};
-use skinrig_recorder::{RecorderError, SessionReader, SessionWriter, list, verify};
+use skinrig_recorder::{RecorderError, SessionReader, SessionWriter, list, salvage, verify};
 
 /// Bytes of a page of a session file.
 const PAGE: usize = 65536;
@@ -115,6 +115,16 @@ fn changed_rows_of_a_sealed_session_are_refused() {
             Err(RecorderError::Changed { tables, .. }) => assert_eq!(tables, [table]),
             other => panic!("{statement}: {other:?}"),
         }
+        // What is salvaged has those values, too, and says so.
+        let to = folder.path().join(format!("{n}.salvaged.session.sqlite"));
+        let report = salvage(&changed, &to).unwrap();
+        let sealed_rows = table != "seal";
+        assert_eq!(
+            report.changed.contains(&table.to_owned()),
+            sealed_rows,
+            "{statement}"
+        );
+        assert_eq!(report.is_whole(), !sealed_rows, "{statement}");
     }
     // A session that was never sealed has nothing to compare with.
     change(&path, &["DELETE FROM seal"]);
