@@ -1,4 +1,4 @@
-//! A simulated event camera: encodes pixel events and trigger edges as EVT2 bytes, like a real camera.
+//! A simulated event camera: its settings, its states, and what happens to it.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -6,16 +6,17 @@ use skinrig_device::{
     CameraCapabilities, CameraSettings, DeviceError, EventCamera, OpenChunk, PatternScan,
     TestPattern, newest_words,
 };
-use skinrig_formats::{Scanner, evt2};
+use skinrig_formats::evt2;
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostTime, RawChunk, RigFault, SENSOR_HEIGHT,
-    SENSOR_WIDTH, Setting, StreamFormat,
+    CameraId, DeviceIdentity, DeviceRole, RawChunk, RigFault, SENSOR_HEIGHT, SENSOR_WIDTH, Setting,
+    StreamFormat,
 };
 
-use crate::camera_stream::{OutputQueue, StreamState};
+use crate::byte_encoder::{ByteEncoder, CameraFaults, Encoding, Interval};
+use crate::camera_stream::StreamState;
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{self, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS};
+use crate::faults::{self, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS};
 use crate::line::LineEdge;
 use crate::pattern::ScanModel;
 use crate::random::{Purpose, Stream};
@@ -41,6 +42,12 @@ pub(crate) const TEMPERATURE_C: f64 = 35.0;
 /// Supported rates of the test pattern, events per second.
 const PATTERN_RATES_EV_S: std::ops::RangeInclusive<f64> = 1.0..=50e6;
 
+/// Grid steps that a camera's thread gets at once.
+const BATCH_STEPS: usize = 64;
+
+/// Batches after which a poll waits for the thread: chunks are handed over within 1 s of rig time.
+const MOST_BATCHES: usize = 16;
+
 /// Creates the pixel model for the n-th start of a camera; `None` at levels without pixels.
 pub(crate) type PixelFactory = Box<dyn Fn(u64) -> Option<Box<dyn PixelModel>> + Send>;
 
@@ -49,7 +56,6 @@ pub(crate) struct SimCamera {
     shared: Shared,
     id: CameraId,
     serial: String,
-    chunk_bytes: usize,
     jitter_ns: i64,
     setting_ignored: Option<FaultTrigger>,
     lost: Vec<(FaultTrigger, u64)>,
@@ -58,17 +64,25 @@ pub(crate) struct SimCamera {
     storms: Vec<FaultTrigger>,
     steps: Vec<(FaultTrigger, u32)>,
     hot: Option<FaultTrigger>,
-    buffer_bytes: usize,
     make_pixels: PixelFactory,
     random: Stream,
     draw_clock: crate::config::CameraClockConfig,
-    clock: Option<DriftingClock>,
     settings: CameraSettings,
     pattern: Option<PatternScan>,
     starts: u64,
-    streaming: Option<StreamState>,
-    scanner: Scanner,
-    out: OutputQueue,
+    /// Grid point up to which the camera has seen the world; `None` while stopped.
+    grid: Option<i64>,
+    last_edge_ns: i64,
+    /// What happened since, to be encoded, and its grid steps.
+    waiting: Vec<Interval>,
+    waiting_steps: usize,
+    /// Batches on the thread since chunks were last handed over.
+    batches: usize,
+    encoding: Encoding,
+    /// Whether every poll encodes all there is: the caller reads the open chunk, or there is next to nothing to encode.
+    is_prompt: bool,
+    /// Whether the cable is pulled, and whether the host has noticed.
+    unplugged: bool,
     gone: bool,
 }
 
@@ -87,7 +101,6 @@ impl SimCamera {
             shared,
             id,
             serial: format!("sim-{:08x}-c{}", config.seed as u32, id.number()),
-            chunk_bytes: config.camera_clock.chunk_bytes.max(4) / 4 * 4,
             jitter_ns: config.camera_clock.trigger_jitter_ns.max(0),
             setting_ignored: times(RigFault::CameraSettingIgnored).next(),
             lost: times(RigFault::CameraDrops)
@@ -100,17 +113,20 @@ impl SimCamera {
                 .map(|when| (when, sizes.clock_step_us))
                 .collect(),
             hot: times(RigFault::CameraHot).last(),
-            buffer_bytes: config.camera_clock.buffer_bytes.max(4) / 4 * 4,
             make_pixels,
             random: Stream::new(config.seed, Purpose::CameraClock, id.index() as u64),
             draw_clock: config.camera_clock,
-            clock: None,
             settings: CameraSettings::default(),
             pattern: None,
             starts: 0,
-            streaming: None,
-            scanner: Scanner::new(StreamFormat::Evt2),
-            out: OutputQueue::default(),
+            grid: None,
+            last_edge_ns: i64::MIN,
+            waiting: Vec::new(),
+            waiting_steps: 0,
+            batches: 0,
+            encoding: Encoding::new(ByteEncoder::new(id, config.camera_clock)),
+            is_prompt: false,
+            unplugged: false,
             gone: false,
         }
     }
@@ -120,7 +136,7 @@ impl SimCamera {
         if self.gone {
             return Err(self.gone_error());
         }
-        if self.streaming.is_some() {
+        if self.grid.is_some() {
             return Err(DeviceError::State {
                 role: self.role(),
                 serial: self.serial.clone(),
@@ -184,105 +200,60 @@ impl SimCamera {
         Ok(())
     }
 
-    /// Simulates and encodes everything up to the current time.
-    fn catch_up(&mut self) {
-        let Some(stream) = &mut self.streaming else {
-            return;
-        };
+    /// Takes note of what happens to the camera up to the current time.
+    fn observe(&mut self) {
+        let Some(grid) = self.grid else { return };
         let index = self.id.index();
-        let due = {
-            let mut world = self.shared.world();
-            world.tips_since(index, stream.grid, &mut stream.tips);
-            let jitter = |random: &mut Stream| (random.unit() * self.jitter_ns as f64) as i64;
-            for edge in world.line.take_edges(index) {
-                let seen_ns = edge.t_ns + jitter(&mut self.random);
-                // Edges never overtake each other.
-                let before_ns = stream.edges.back().map_or(seen_ns, |e| e.t_ns);
-                let t_ns = seen_ns.max(before_ns);
-                stream.edges.push_back(LineEdge { t_ns, ..edge });
-            }
-            stream.grid = world.grid();
-            CameraFaults {
-                unplugged_ns: occurred(&world, self.unplug),
-                stalled_ns: occurred(&world, self.stall),
-                storms_ns: self
-                    .storms
-                    .iter()
-                    .filter_map(|s| world.occurred_at(*s))
-                    .collect(),
-                losses: take_occurred(&world, &mut self.lost),
-                steps: take_occurred(&world, &mut self.steps),
-            }
-        };
-        let Some(mut clock) = self.clock else { return };
-        // Bytes that were not fetched in time are lost, newest first.
-        let mut room = self.buffer_bytes;
-        let tips = std::mem::take(&mut stream.tips);
-        for pair in tips.windows(2) {
-            let (from, to) = (pair[0], pair[1]);
-            if due.unplugged_ns.is_some_and(|t| t <= from.t_ns) {
-                self.gone = true;
-                break;
-            }
-            let within = |t: &i64| (from.t_ns..to.t_ns).contains(t);
-            let lose: u64 = due
-                .losses
-                .iter()
-                .filter(|(t, _)| within(t))
-                .map(|(_, words)| words * 4)
-                .sum();
-            if lose > 0 {
-                self.out.close(self.id, &mut self.scanner);
-                self.out.to_lose += lose;
-            }
-            for (_, by_us) in due.steps.iter().filter(|(t, _)| within(t)) {
-                clock = clock.stepped(i64::from(*by_us));
-                self.clock = Some(clock);
-                stream.encoder = evt2::Encoder::new(clock.own_us(from.t_ns));
-            }
-            let stormy = |t: &i64| (*t..*t + STORM_NS).contains(&from.t_ns);
-            let storm = due.storms_ns.iter().any(stormy);
-            stream.step(from, to, clock, &self.settings, storm);
-            if due.stalled_ns.is_some_and(|t| t <= from.t_ns) {
-                stream.fresh.clear();
-                continue;
-            }
-            if stream.fresh.len() > room {
-                if self.out.lost_before == 0 {
-                    self.out.close(self.id, &mut self.scanner);
-                }
-                self.out.lost_before += stream.fresh.len() as u64;
-                stream.fresh.clear();
-                continue;
-            }
-            room -= stream.fresh.len();
-            self.out.take(
-                &mut stream.fresh,
-                HostTime(to.t_ns),
-                self.id,
-                &mut self.scanner,
-                self.chunk_bytes,
-            );
+        let mut world = self.shared.world();
+        let mut tips = Vec::new();
+        world.tips_since(index, grid, &mut tips);
+        let mut edges = Vec::new();
+        for edge in world.line.take_edges(index) {
+            let jitter_ns = (self.random.unit() * self.jitter_ns as f64) as i64;
+            // Edges never overtake each other.
+            self.last_edge_ns = self.last_edge_ns.max(edge.t_ns + jitter_ns);
+            let t_ns = self.last_edge_ns;
+            edges.push(LineEdge { t_ns, ..edge });
         }
-        stream.tips = tips;
+        self.grid = Some(world.grid());
+        let storms = self.storms.iter();
+        let faults = CameraFaults {
+            unplugged_ns: occurred(&world, self.unplug),
+            stalled_ns: occurred(&world, self.stall),
+            storms_ns: storms.filter_map(|s| world.occurred_at(*s)).collect(),
+            losses: take_occurred(&world, &mut self.lost),
+            steps: take_occurred(&world, &mut self.steps),
+        };
+        self.unplugged = faults.unplugged_ns.is_some();
+        self.waiting_steps += tips.len().saturating_sub(1);
+        self.waiting.push(Interval {
+            tips,
+            edges,
+            faults,
+        });
+    }
+
+    /// Encodes everything up to the current time.
+    fn catch_up(&mut self) {
+        self.observe();
+        self.encoding.finish(&mut self.waiting);
+        self.waiting_steps = 0;
     }
 
     fn hand_over(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
-        chunks.extend(self.out.ready.drain(..));
+        self.batches = 0;
+        let mut encoder = self.encoding.ended();
+        if encoder.gone {
+            encoder.close_chunk();
+        }
+        chunks.extend(encoder.out.ready.drain(..));
+        self.gone = encoder.gone;
+        drop(encoder);
         if self.gone {
             return Err(self.gone_error());
         }
         Ok(())
     }
-}
-
-/// Faults of a camera in world time, ns.
-struct CameraFaults {
-    unplugged_ns: Option<i64>,
-    stalled_ns: Option<i64>,
-    storms_ns: Vec<i64>,
-    losses: Vec<(i64, u64)>,
-    steps: Vec<(i64, u32)>,
 }
 
 /// Time of a fault, if it has occurred.
@@ -376,64 +347,77 @@ impl EventCamera for SimCamera {
     fn start(&mut self) -> Result<(), DeviceError> {
         self.expect_stopped()?;
         let grid = self.shared.world().watch(self.id.index());
-        let start_ns = grid * GRID_NS;
-        let clock = match self.clock {
-            Some(clock) => clock,
-            None => DriftingClock::draw(
-                self.draw_clock.max_origin_s,
-                self.draw_clock.max_drift_ppm,
-                &mut self.random,
-                start_ns,
-            ),
-        };
-        self.clock = Some(clock);
         let pixels = match &self.pattern {
             None => (self.make_pixels)(self.starts),
             Some(scan) => Some(Box::new(ScanModel::new(*scan)) as Box<dyn PixelModel>),
         };
-        self.streaming = Some(StreamState {
-            grid,
+        // Without pixels, there is nothing to do that is worth a thread.
+        self.is_prompt = pixels.is_none();
+        let start_ns = grid * GRID_NS;
+        let draw = self.draw_clock;
+        let random = &mut self.random;
+        let mut encoder = self.encoding.ended();
+        let clock = *encoder.clock.get_or_insert_with(|| {
+            DriftingClock::draw(draw.max_origin_s, draw.max_drift_ppm, random, start_ns)
+        });
+        encoder.start(StreamState {
             pixels,
             has_region: self.pattern.is_none(),
             encoder: evt2::Encoder::new(clock.own_us(start_ns)),
             edges: VecDeque::new(),
-            tips: Vec::new(),
+            settings: self.settings.clone(),
             events: Vec::new(),
             fresh: Vec::new(),
         });
+        drop(encoder);
+        self.grid = Some(grid);
         self.starts += 1;
         Ok(())
     }
 
     fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
-        self.catch_up();
-        if self.gone {
-            self.out.close(self.id, &mut self.scanner);
+        self.observe();
+        // The host notices at once that a camera is gone.
+        if self.is_prompt || self.unplugged {
+            self.catch_up();
+        }
+        if self.waiting_steps >= BATCH_STEPS {
+            self.encoding.run(&mut self.waiting);
+            self.waiting_steps = 0;
+            self.batches += 1;
+        }
+        if self.encoding.is_running() && self.batches < MOST_BATCHES {
+            return Ok(());
         }
         self.hand_over(chunks)
     }
 
     fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         self.catch_up();
-        self.out.close(self.id, &mut self.scanner);
+        self.encoding.ended().close_chunk();
         self.hand_over(chunks)
     }
 
     fn newest(&mut self, most: usize) -> Option<Vec<u8>> {
-        Some(newest_words(&self.out.bytes, most))
+        Some(newest_words(&self.encoding.ended().out.bytes, most))
     }
 
     fn open_chunk(&mut self, from: usize) -> Option<OpenChunk> {
-        let out = &self.out;
+        if !std::mem::replace(&mut self.is_prompt, true) {
+            return None;
+        }
+        let encoder = self.encoding.ended();
+        let out = &encoder.out;
         OpenChunk::of(out.seq, out.lost_before, &out.bytes, from)
     }
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
-        if self.streaming.is_none() {
+        if self.grid.is_none() {
             return Ok(());
         }
         let flushed = self.flush(chunks);
-        self.streaming = None;
+        self.encoding.ended().stop();
+        self.grid = None;
         self.shared.world().unwatch(self.id.index());
         flushed
     }

@@ -16,14 +16,13 @@ use crate::scene::{GRID_NS, PixelEvent, PixelModel, TipSample};
 
 /// State that exists only while streaming.
 pub(crate) struct StreamState {
-    pub grid: i64,
     pub pixels: Option<Box<dyn PixelModel>>,
     /// Whether the events come from pixels, to which a region of interest applies.
     pub has_region: bool,
     pub encoder: evt2::Encoder,
     /// Trigger edges to encode, with the camera's time of each.
     pub edges: VecDeque<LineEdge>,
-    pub tips: Vec<TipSample>,
+    pub settings: CameraSettings,
     pub events: Vec<PixelEvent>,
     pub fresh: Vec<u8>,
 }
@@ -51,7 +50,6 @@ impl StreamState {
         from: TipSample,
         to: TipSample,
         clock: DriftingClock,
-        set: &CameraSettings,
         storm: bool,
     ) {
         self.events.clear();
@@ -61,6 +59,7 @@ impl StreamState {
         if storm {
             add_storm(from.t_ns, &mut self.events);
         }
+        let set = &self.settings;
         let triggered = set.trigger_channels.contains(&TRIGGER_CHANNEL);
         for event in &self.events {
             while let Some(edge) = self.edges.front().copied()

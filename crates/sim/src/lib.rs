@@ -4,6 +4,7 @@
 //! [`SimConfig`] determines everything: equal configurations and equal commands at equal times give equal bytes on every machine,
 //! however often the devices are polled. [`replay`] serves a recording through the same traits.
 
+mod byte_encoder;
 pub mod camera;
 mod camera_stream;
 pub mod clock;

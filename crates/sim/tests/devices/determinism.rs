@@ -2,7 +2,7 @@
 
 use crate::common::{RunData, places, press_all, ready};
 use proptest::prelude::*;
-use skinrig_model::{CameraId, SimLevel};
+use skinrig_model::{CameraId, HostDuration, SimLevel};
 use skinrig_sim::{SimConfig, simulated_rig};
 
 fn run(config: &SimConfig, ticks: &[i64]) -> RunData {
@@ -56,3 +56,54 @@ fn seeds_matter_and_bytes_are_pinned() {
 }
 
 const PINNED: [&str; 2] = ["08e28d96ddc65b58", "55cf436fa10adb35"];
+
+const TICK_MS: i64 = 5;
+/// Time within which chunks are handed over by a camera whose open chunk nobody reads.
+const LAG_MS: i64 = 1_100;
+
+/// A press polled at every tick: the chunks of both cameras, and their numbers after each poll.
+fn polled(reads_open_chunk: bool) -> (RunData, Vec<[usize; 2]>) {
+    let mut config = small_chunks(5, SimLevel::Optical);
+    config.camera_clock.chunk_bytes = 4_000;
+    let mut rig = simulated_rig(&config);
+    ready(&mut rig);
+    let (at, up) = (places(1)[0], rig.robot_from_skin);
+    let mut data = RunData::default();
+    let mut counts = Vec::new();
+    for (z_mm, ticks) in [(-2.0, 300), (3.0, 300)] {
+        rig.indenter
+            .command(up.apply(at.at_height(z_mm)), 20.0)
+            .unwrap();
+        for _ in 0..ticks {
+            let next = rig.clock.now() + HostDuration::from_millis(TICK_MS);
+            rig.clock.wait_until(next);
+            data.poll(&mut rig).unwrap();
+            if reads_open_chunk {
+                for camera in &mut rig.cameras {
+                    let _ = camera.open_chunk(0);
+                }
+            }
+            counts.push(CameraId::ALL.map(|c| data.chunks[c.index()].len()));
+        }
+    }
+    data.stop(&mut rig);
+    (data, counts)
+}
+
+#[test]
+fn threads_change_no_byte_and_hand_over_at_times_of_the_rig() {
+    let (at_once, now) = polled(true);
+    let (on_threads, later) = polled(false);
+    assert!(later.last().is_some_and(|last| last.iter().all(|n| *n > 3)));
+    assert!(on_threads.chunks == at_once.chunks);
+    assert_eq!(
+        polled(false).1,
+        later,
+        "when threads are done must not matter"
+    );
+    assert_ne!(now, later, "this compares threads with none");
+    let lag = (LAG_MS / TICK_MS) as usize;
+    for (then, found) in now.iter().zip(&later[lag..]) {
+        assert!(found[0] >= then[0] && found[1] >= then[1]);
+    }
+}
