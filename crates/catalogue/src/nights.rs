@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use skinrig_nightly::Night;
+use skinrig_nightly::{Night, unsound};
 
 use crate::catalogue::Catalogue;
 use crate::db::Db;
@@ -46,12 +46,19 @@ impl Catalogue {
                 }
             };
             let folder = self.store_of(file.parent().unwrap_or(nights))?;
-            let is_new = self.transaction("registering a night", async |db| {
+            let inserted = self.transaction("registering a night", async |db| {
                 insert(db, &night, &folder).await
             })?;
-            match is_new {
-                true => done.registered += 1,
-                false => done.unchanged += 1,
+            match inserted {
+                Inserted::New => done.registered += 1,
+                Inserted::Known => done.unchanged += 1,
+                Inserted::Conflicting => done.unreadable.push(Unreadable {
+                    file: file.display().to_string(),
+                    reason: format!(
+                        "expected one night {} of {}, found another in the catalogue; one of the two was changed",
+                        night.id, night.rig
+                    ),
+                }),
             }
         }
         Ok(done)
@@ -85,9 +92,9 @@ fn read(path: &Path) -> Result<Night, CatalogueError> {
         source,
     })?;
     let night: Night = serde_json::from_slice(&text).map_err(|e| invalid(e.to_string()))?;
-    match night.finished {
-        true => Ok(night),
-        false => Err(invalid("one that is unfinished".to_owned())),
+    match unsound(&night) {
+        None => Ok(night),
+        Some(found) => Err(invalid(found)),
     }
 }
 
@@ -103,12 +110,31 @@ fn digest(night: &Night) -> String {
     ))
 }
 
-/// Inserts a night; false if the catalogue has it. Another state of it, from the same folder, is replaced.
-async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<bool, sqlx::Error> {
+/// What became of a night.
+enum Inserted {
+    New,
+    /// The catalogue has it.
+    Known,
+    /// The catalogue has another of its name, from another folder.
+    Conflicting,
+}
+
+/// Inserts a night. Another state of it, from the same folder, is replaced.
+async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<Inserted, sqlx::Error> {
     let sha256 = digest(night);
     db.lock(&sha256).await?;
     let sql = "DELETE FROM night WHERE folder = $1 AND sha256 <> $2";
     db.execute(sql, &[folder.into(), (&sha256).into()]).await?;
+    let sql = "SELECT sha256 FROM night WHERE rig = $1 AND rig_kind = $2 AND night_id = $3 AND sha256 <> $4";
+    let named = [
+        (&night.rig).into(),
+        (&night.rig_kind).into(),
+        (&night.id).into(),
+        (&sha256).into(),
+    ];
+    if !db.fetch(sql, &named).await?.rows.is_empty() {
+        return Ok(Inserted::Conflicting);
+    }
     let values: [Bound; 12] = [
         (&sha256).into(),
         (&night.id).into(),
@@ -132,7 +158,7 @@ async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<bool, sqlx::
         )
         .await?;
     if added == 0 {
-        return Ok(false);
+        return Ok(Inserted::Known);
     }
     for check in &night.checks {
         let parts = check.attempts.last().map(|a| a.parts.as_slice());
@@ -155,5 +181,5 @@ async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<bool, sqlx::
             }
         }
     }
-    Ok(true)
+    Ok(Inserted::New)
 }

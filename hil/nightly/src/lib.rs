@@ -12,10 +12,12 @@ pub mod junit;
 pub mod night;
 pub mod rules;
 pub mod trend;
+mod unsound;
 pub mod verdict;
 
 pub use cause::Cause;
 pub use evidence::{Evidence, EvidenceKind};
 pub use night::{Attempt, CheckResult, GoldenSession, Measurement, Night, Part, Versions};
 pub use rules::{Rule, RuleResult};
+pub use unsound::unsound;
 pub use verdict::{NightExit, Verdict};

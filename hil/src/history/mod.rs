@@ -11,10 +11,10 @@ mod write;
 pub use self::suite_nights::SuiteNights;
 use std::path::{Path, PathBuf};
 
-use skinrig_nightly::Night;
 use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::trend::derived::RATIOS;
-use skinrig_nightly::trend::{Acceptance, History, NightSummary};
+use skinrig_nightly::trend::{Acceptance, History, NightSummary, Series};
+use skinrig_nightly::{Night, unsound};
 use tokio::runtime::Runtime;
 
 pub use error::HistoryError;
@@ -36,6 +36,8 @@ pub struct Filter {
     pub rig: Option<String>,
     /// Name of the suite.
     pub suite: Option<String>,
+    /// `bench` or `emulated`.
+    pub rig_kind: Option<String>,
 }
 
 /// Adds a night, whose files are in `folder`, to the history at `path`, and creates the history if needed. Atomic; adding the same
@@ -44,12 +46,13 @@ pub struct Filter {
 /// # Errors
 /// [`HistoryError::Foreign`], [`HistoryError::Newer`] or [`HistoryError::Damaged`] for an unsuitable file,
 /// [`HistoryError::ConflictingNight`] if it has a different night of the same name, [`HistoryError::InvalidNight`] for an unfinished
-/// night, and errors of the operating system or SQLite.
+/// night or one whose times, values or names cannot be those of a night, [`HistoryError::Damaged`] also if the history has other values than
+/// the same night, and errors of the operating system or SQLite.
 pub fn append(path: &Path, night: &Night, folder: &Path) -> Result<AppendOutcome, HistoryError> {
-    if !night.finished {
+    if let Some(found) = unsound(night) {
         return Err(HistoryError::InvalidNight {
             path: folder.to_owned(),
-            found: format!("{}, which is unfinished", night.id),
+            found,
         });
     }
     let head = NightSummary::of(night, relative(path, folder));
@@ -59,7 +62,18 @@ pub fn append(path: &Path, night: &Night, folder: &Path) -> Result<AppendOutcome
         let mut conn = file::open(path, true).await?;
         let mut tx = file::begin(&mut conn).await.map_err(fault)?;
         match write::stored_digest(&mut tx, &head).await.map_err(fault)? {
-            Some(known) if known == sha256 => return Ok(AppendOutcome::AlreadyPresent),
+            Some(known) if known == sha256 => {
+                let stored = read::night(&mut tx, &head).await.map_err(fault)?;
+                return if is_same(&stored, night) {
+                    Ok(AppendOutcome::AlreadyPresent)
+                } else {
+                    Err(fault(QueryError::damaged(
+                        &format!("night {} of {}", head.id, head.rig),
+                        "the values of its night.json",
+                        "others",
+                    )))
+                };
+            }
             Some(_) => {
                 return Err(HistoryError::ConflictingNight {
                     path: path.to_owned(),
@@ -75,6 +89,19 @@ pub fn append(path: &Path, night: &Night, folder: &Path) -> Result<AppendOutcome
         tx.commit().await.map_err(|e| fault(e.into()))?;
         Ok(AppendOutcome::Added)
     })
+}
+
+/// Whether the rows of a night are those of its JSON. The folder may have moved; SQLite has no NaN, and infinity is not a measurement.
+fn is_same((stored, series): &(NightSummary, Vec<Series>), night: &Night) -> bool {
+    let mut one = History::default();
+    one.push(night, &*stored.folder);
+    for head in &mut one.nights {
+        head.versions.firmware.clear();
+    }
+    for point in one.series.iter_mut().flat_map(|s| &mut s.points) {
+        point.value = point.value.filter(|v| v.is_finite());
+    }
+    one.nights.first() == Some(stored) && one.series == *series
 }
 
 /// The suites in the history, by bench; the one with the newest night first.
@@ -99,6 +126,7 @@ pub fn load(path: &Path, filter: &Filter) -> Result<History, HistoryError> {
     let matches = |line: &&SuiteNights| {
         filter.rig.as_ref().is_none_or(|rig| *rig == line.rig)
             && filter.suite.as_ref().is_none_or(|s| *s == line.suite)
+            && filter.rig_kind.as_ref().is_none_or(|k| *k == line.rig_kind)
     };
     let Some(line) = suites.iter().find(matches) else {
         let each = suites.iter().map(|l| format!("{} on {}", l.suite, l.rig));
@@ -119,7 +147,7 @@ pub fn load(path: &Path, filter: &Filter) -> Result<History, HistoryError> {
     };
     runtime(path)?.block_on(async {
         let mut conn = file::open(path, false).await?;
-        let read = read::history(&mut conn, &line.rig, &line.suite).await;
+        let read = read::history(&mut conn, line).await;
         read.map_err(|fault| fault.at(path, "reading it"))
     })
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use skinrig_model::Limit;
-use skinrig_nightly::trend::{Acceptance, History, NightSummary, Point};
+use skinrig_nightly::trend::{Acceptance, History, NightSummary, Point, Series};
 use skinrig_nightly::{Verdict, Versions};
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
@@ -14,8 +14,8 @@ use super::suite_nights::SuiteNights;
 /// The suites in the history, the one with the newest night first.
 pub(super) async fn suites(conn: &mut SqliteConnection) -> Result<Vec<SuiteNights>, QueryError> {
     let rows = sqlx::query(
-        "SELECT rig, suite, count(*) AS nights, max(started) AS newest FROM night GROUP BY rig, suite
-         ORDER BY newest DESC, rig, suite",
+        "SELECT rig, rig_kind, suite, count(*) AS nights, max(started) AS newest FROM night
+         GROUP BY rig, rig_kind, suite ORDER BY newest DESC, rig, rig_kind, suite",
     )
     .fetch_all(conn)
     .await?;
@@ -23,6 +23,7 @@ pub(super) async fn suites(conn: &mut SqliteConnection) -> Result<Vec<SuiteNight
         .map(|row| {
             Ok(SuiteNights {
                 rig: row.try_get("rig")?,
+                rig_kind: row.try_get("rig_kind")?,
                 suite: row.try_get("suite")?,
                 nights: number(row, "nights")?,
             })
@@ -30,19 +31,21 @@ pub(super) async fn suites(conn: &mut SqliteConnection) -> Result<Vec<SuiteNight
         .collect()
 }
 
-/// All nights and measurements of one suite on one bench.
+/// All nights and measurements of one suite on one bench, of one kind.
 pub(super) async fn history(
     conn: &mut SqliteConnection,
-    rig: &str,
-    suite: &str,
+    of: &SuiteNights,
 ) -> Result<History, QueryError> {
     let mut all = History::default();
     let mut index = BTreeMap::new();
-    let rows = sqlx::query("SELECT * FROM night WHERE rig = ? AND suite = ? ORDER BY started, id")
-        .bind(rig)
-        .bind(suite)
-        .fetch_all(&mut *conn)
-        .await?;
+    let rows = sqlx::query(
+        "SELECT * FROM night WHERE rig = ? AND rig_kind = ? AND suite = ? ORDER BY started, id",
+    )
+    .bind(&of.rig)
+    .bind(&of.rig_kind)
+    .bind(&of.suite)
+    .fetch_all(&mut *conn)
+    .await?;
     for row in &rows {
         index.insert(row.try_get::<i64, _>("id")?, all.nights.len());
         all.nights.push(head(row)?);
@@ -56,9 +59,9 @@ pub(super) async fn history(
             all.nights[at].versions.firmware.push(device);
         }
     }
-    points(conn, &index, &mut all).await?;
+    points(conn, None, &index, &mut all).await?;
     let rows = sqlx::query("SELECT * FROM acceptance WHERE rig = ? ORDER BY id")
-        .bind(rig)
+        .bind(&of.rig)
         .fetch_all(conn)
         .await?;
     for row in &rows {
@@ -73,9 +76,26 @@ pub(super) async fn history(
     Ok(all)
 }
 
-/// Adds the measurements of the last attempts.
+/// One night, without its firmware, and its series.
+pub(super) async fn night(
+    conn: &mut SqliteConnection,
+    of: &NightSummary,
+) -> Result<(NightSummary, Vec<Series>), QueryError> {
+    let row = sqlx::query("SELECT * FROM night WHERE rig = ? AND night_id = ?")
+        .bind(&of.rig)
+        .bind(&of.id)
+        .fetch_one(&mut *conn)
+        .await?;
+    let id = row.try_get("id")?;
+    let mut all = History::default();
+    points(conn, Some(id), &BTreeMap::from([(id, 0)]), &mut all).await?;
+    Ok((head(&row)?, all.series))
+}
+
+/// Adds the measurements of the last attempts; `only` those of this night.
 async fn points(
     conn: &mut SqliteConnection,
+    only: Option<i64>,
     index: &BTreeMap<i64, usize>,
     all: &mut History,
 ) -> Result<(), QueryError> {
@@ -83,8 +103,10 @@ async fn points(
         "SELECT m.*, c.attempts FROM measurement m
          JOIN check_made c ON c.night = m.night AND c.name = m.check_name AND c.attempts = m.attempt
          JOIN night t ON t.id = m.night
+         WHERE ?1 IS NULL OR m.night = ?1
          ORDER BY t.started, t.id, m.check_name, m.subject, m.metric",
     )
+    .bind(only)
     .fetch_all(conn)
     .await?;
     for row in &rows {

@@ -5,6 +5,8 @@
 pub struct SuiteNights {
     /// Name of the bench.
     pub rig: String,
+    /// `bench` or `emulated`.
+    pub rig_kind: String,
     /// Name of the suite.
     pub suite: String,
     /// Number of nights.

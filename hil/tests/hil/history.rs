@@ -26,17 +26,19 @@ fn measured(metric: &str, value: Option<f64>) -> Measurement {
 }
 
 fn attempt(value: Option<f64>) -> Attempt {
+    let measurements = vec![measured("located", value), measured("valid", Some(100.0))];
+    let verdict = Verdict::worst(measurements.iter().map(|m| m.verdict));
     let part = Part {
         subject: "skin".to_owned(),
-        measurements: vec![measured("located", value), measured("valid", Some(100.0))],
-        verdict: Verdict::Pass,
+        measurements,
+        verdict,
     };
     Attempt {
         began_s: 0.0,
         took_s: 1.0,
         parts: vec![part],
         evidence: Vec::new(),
-        verdict: Verdict::Pass,
+        verdict,
         cause: None,
         rule: None,
     }
@@ -44,13 +46,16 @@ fn attempt(value: Option<f64>) -> Attempt {
 
 /// Night number `day` with one attempt at the golden check per value.
 fn night(day: u32, rig: &str, values: &[Option<f64>]) -> Night {
+    let attempts: Vec<Attempt> = values.iter().copied().map(attempt).collect();
+    let last = attempts.last().map(|a| a.verdict);
+    let verdict = Verdict::worst(last.into_iter().chain([Verdict::Marginal]));
     let check = CheckResult {
         name: "golden".to_owned(),
         title: "golden skin".to_owned(),
         planned_s: 60.0,
-        attempts: values.iter().copied().map(attempt).collect(),
+        attempts,
         skipped: None,
-        verdict: Verdict::Marginal,
+        verdict,
         repeats: None,
         cause: None,
         rule: None,
@@ -87,7 +92,7 @@ fn night(day: u32, rig: &str, values: &[Option<f64>]) -> Night {
             report: None,
             results_sha256: None,
         }),
-        verdict: Verdict::Marginal,
+        verdict,
         exit: NightExit::Pass,
     }
 }
@@ -134,7 +139,7 @@ fn nights_are_read_back_unchanged_in_any_order_and_added_only_once() {
     }
     let one = Filter {
         rig: Some("b1".to_owned()),
-        suite: None,
+        ..Filter::default()
     };
     assert_eq!(load(&path, &one).unwrap(), expected);
     let located = &expected.series[0];
@@ -163,6 +168,98 @@ fn nights_are_read_back_unchanged_in_any_order_and_added_only_once() {
     std::fs::write(&later, serde_json::to_vec(&unknown).unwrap()).unwrap();
     let e = skinrig_hil::history::read_night(&later).unwrap_err();
     assert!(e.to_string().contains("version 999"), "{e}");
+}
+
+#[test]
+fn a_bench_and_its_emulation_share_no_history() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("history.sqlite");
+    let emulated = night(1, "b1", &[Some(97.0)]);
+    let mut real = night(2, "b1", &[Some(97.0)]);
+    real.rig_kind = "bench".to_owned();
+    for night in [&emulated, &real] {
+        append(&path, night, folder.path()).unwrap();
+    }
+    let of = |kind: Option<&str>| {
+        let filter = Filter {
+            rig_kind: kind.map(str::to_owned),
+            ..Filter::default()
+        };
+        let nights = load(&path, &filter).unwrap().nights;
+        nights.into_iter().map(|n| n.id).collect::<Vec<_>>()
+    };
+    assert_eq!(of(Some("emulated")), [emulated.id]);
+    assert_eq!(of(Some("bench")), [real.id.clone()]);
+    assert_eq!(of(None), [real.id], "those of the newest night");
+}
+
+#[test]
+fn nights_that_cannot_be_are_refused_with_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("history.sqlite");
+    let refused = |change: &dyn Fn(&mut Night), expected: &str| {
+        let mut night = night(1, "b1", &[Some(97.0)]);
+        change(&mut night);
+        let e = append(&path, &night, folder.path()).unwrap_err();
+        let found = matches!(e, HistoryError::InvalidNight { .. });
+        assert!(found && e.to_string().contains(expected), "{e}");
+    };
+    for started in ["yesterday", "", "2026-11-01T02:00:00+05:00"] {
+        refused(&|n| n.started = started.to_owned(), "a time in UTC");
+    }
+    refused(&|n| n.checks.push(n.checks[0].clone()), "golden twice");
+    refused(
+        &|n| {
+            let part = &mut n.checks[0].attempts[0].parts[0];
+            part.measurements.push(part.measurements[0].clone());
+        },
+        "skin/located twice in the check golden",
+    );
+    refused(
+        &|n| n.versions.firmware.push(("camera1".into(), "2".into())),
+        "two firmware versions of camera1",
+    );
+    refused(
+        &|n| n.checks[0].attempts[0].parts[0].measurements[0].interval = Some([3.0, 1.0]),
+        "the interval 3 to 1 of skin/located",
+    );
+    refused(
+        &|n| {
+            n.verdict = Verdict::Pass;
+            n.checks[0].verdict = Verdict::Fail;
+        },
+        "PASS above FAIL among its checks",
+    );
+    refused(
+        &|n| n.checks[0].attempts[0].parts[0].measurements[0].value = Some(1.0),
+        "above FAIL in the check golden",
+    );
+    // Those after them are added.
+    append(&path, &night(2, "b1", &[Some(97.0)]), folder.path()).unwrap();
+}
+
+#[test]
+fn rows_that_differ_from_their_night_are_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("history.sqlite");
+    let night = night(1, "b1", &[Some(40.125)]);
+    append(&path, &night, folder.path()).unwrap();
+    let sound = std::fs::read(&path).unwrap();
+    // As SQLite stores them.
+    let (from, to) = (40.125f64.to_be_bytes(), 41.125f64.to_be_bytes());
+    let stored = sound.windows(8).position(|w| w == from);
+    let mut edited = sound;
+    match stored {
+        Some(at) => edited[at..at + 8].copy_from_slice(&to),
+        None => panic!("the value is not in the file"),
+    }
+    std::fs::write(&path, &edited).unwrap();
+    let e = append(&path, &night, folder.path()).unwrap_err();
+    assert!(matches!(e, HistoryError::Damaged { .. }), "{e}");
+    assert!(
+        e.to_string().contains("the values of its night.json"),
+        "{e}"
+    );
 }
 
 #[test]

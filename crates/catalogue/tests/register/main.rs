@@ -7,6 +7,7 @@ mod common;
 mod files;
 mod kills;
 mod migrations;
+mod nights;
 #[cfg(unix)]
 mod postgres;
 mod presses;

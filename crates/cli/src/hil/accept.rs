@@ -19,6 +19,7 @@ pub(crate) fn accept(args: &HilAcceptArgs, json: bool) -> Outcome {
     let filter = Filter {
         rig: args.rig.clone(),
         suite: args.suite.clone(),
+        ..Filter::default()
     };
     let history = history::load(&args.history, &filter).map_err(Failure::input)?;
     let acceptance = Acceptance {

@@ -66,7 +66,8 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
             outln!("\n{}", file.display());
         }
     }
-    Ok(Exit::Night(if report.alarms.is_empty() {
+    let is_steady = report.alarms.is_empty() && report.unmeasured().next().is_none();
+    Ok(Exit::Night(if is_steady {
         NightExit::Pass
     } else {
         NightExit::Fail
@@ -77,6 +78,7 @@ fn judge_history(args: &HilTrendArgs) -> Result<(History, Report), Failure> {
     let filter = Filter {
         rig: args.rig.clone(),
         suite: args.suite.clone(),
+        ..Filter::default()
     };
     let history = history::load(&args.history, &filter).map_err(Failure::input)?;
     let report = judge(&history);
@@ -102,7 +104,7 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
                 e @ (HistoryError::InvalidNight { .. } | HistoryError::ConflictingNight { .. }),
             ) => {
                 skipped += 1;
-                errln!("warning: skipped: {e}");
+                errln!("warning: skipped {}: {e}", home.display());
             }
             Err(e) => return Err(Failure::input(e)),
         }
@@ -115,6 +117,12 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
         )));
     }
     errln!("{new} nights added, {known} already present, {skipped} skipped");
+    if new + known == 0 {
+        return Err(Failure::input(format!(
+            "--rebuild: {}: expected finished nights, found none; see the warnings above",
+            nights.display()
+        )));
+    }
     Ok(())
 }
 
@@ -159,6 +167,7 @@ pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<NightTren
     let filter = Filter {
         rig: Some(night.rig.clone()),
         suite: Some(night.suite.clone()),
+        rig_kind: Some(night.rig_kind.clone()),
     };
     let history = history::load(path, &filter)?;
     let report = judge(&history);

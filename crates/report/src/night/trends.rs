@@ -68,7 +68,7 @@ impl<'a> Trends<'a> {
         let alarm = alarms.find(|a| a.attribution.cause == Some(cause));
         match alarm {
             Some(alarm) => Some((true, format!("probably moved, {}", since(report, alarm)))),
-            None if report.is_learning() => None,
+            None if report.is_learning() || report.unmeasured().next().is_some() => None,
             None => Some((false, "has not moved".to_owned())),
         }
     }
@@ -89,6 +89,8 @@ impl<'a> Trends<'a> {
                     ("moved", Tone::Bad)
                 } else if report.is_learning() {
                     ("learning", Tone::Plain)
+                } else if report.unmeasured().next().is_some() {
+                    ("unmeasured", Tone::Warning)
                 } else {
                     ("steady", Tone::Good)
                 };

@@ -7,7 +7,7 @@ mod page;
 mod terminal;
 
 use skinrig_nightly::trend::report::{cause_name, day, format_change, format_number as number};
-use skinrig_nightly::trend::{Alarm, Chart, Report};
+use skinrig_nightly::trend::{Alarm, Chart, Report, SeriesState};
 
 pub(crate) use alarm::alarms;
 pub(crate) use name::with_names;
@@ -49,12 +49,24 @@ fn cause(alarm: &Alarm) -> String {
     }
 }
 
-/// State of a series, in one word.
-fn state(chart: &Chart) -> &'static str {
-    match (chart.open_excursion(), chart.reference) {
-        (Some(_), _) => "moved",
-        (None, None) => "learning",
-        (None, Some(_)) => "steady",
+/// State of a series, in a word or two.
+const fn state(chart: &Chart) -> &'static str {
+    match chart.state {
+        SeriesState::Moved => "moved",
+        SeriesState::Learning => "learning",
+        SeriesState::NotMeasured => "not measured",
+        SeriesState::Dropped => "dropped",
+        SeriesState::Steady => "steady",
+    }
+}
+
+/// State of a series, with the number of nights that it has not been measured.
+fn state_in_words(chart: &Chart) -> String {
+    match chart.state {
+        SeriesState::NotMeasured => {
+            format!("{} for {} nights", state(chart), chart.unmeasured_nights)
+        }
+        _ => state(chart).to_owned(),
     }
 }
 

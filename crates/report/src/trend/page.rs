@@ -1,11 +1,11 @@
 //! Owns the page of the trends: alarms first, then every series.
 
 use skinrig_nightly::trend::report::{day, format_number as number};
-use skinrig_nightly::trend::{Acceptance, Alarm, Chart, Report};
+use skinrig_nightly::trend::{Acceptance, Alarm, Chart, Report, SeriesState};
 
 use super::alarm::alarms;
 use super::name::{series_name, with_names};
-use super::{ALARM_CSS, Links, cause, figure, moved, state, with_unit};
+use super::{ALARM_CSS, Links, cause, figure, moved, state, state_in_words, with_unit};
 use crate::document::{Banner, Block, Document, Group, Row, Section, Table, Text, soft};
 
 const CSS: &str = include_str!("../../assets/trend/page.css");
@@ -21,7 +21,9 @@ pub fn page(report: &Report, links: &[Links], accepted: &[Acceptance]) -> String
         1 => "1 alarm".to_owned(),
         n => format!("{n} alarms"),
     };
+    let unmeasured = report.unmeasured().count();
     let (tone, head) = match report.alarms.len() {
+        0 if unmeasured > 0 => ("warn", String::new()),
         0 => ("ok", String::new()),
         _ => ("bad", format!("{badge} · ")),
     };
@@ -72,7 +74,7 @@ fn counted(n: usize, what: &str) -> String {
 
 /// Tables of the series: those with a reference, and on request the others.
 fn series(report: &Report) -> Section {
-    let is_learning = |chart: &&Chart| state(chart) == "learning";
+    let is_learning = |chart: &&Chart| chart.state == SeriesState::Learning;
     let (learning, known): (Vec<&Chart>, Vec<&Chart>) = report.charts.iter().partition(is_learning);
     let card = |card: Group, charts: &[&Chart]| {
         (!charts.is_empty()).then(|| card.with(table(report, charts)))
@@ -110,7 +112,10 @@ fn table(report: &Report, charts: &[&Chart]) -> Table {
             reference.unwrap_or_else(so_far).into(),
             last.map_or_else(|| "-".to_owned(), |n| with_unit(n.value, unit))
                 .into(),
-            Text::new().span(state, format!("{state} {}", moved(chart))),
+            Text::new().span(
+                state.replace(' ', "-"),
+                format!("{} {}", state_in_words(chart), moved(chart)),
+            ),
         ])
         .attribute("title", &chart.series.name)
     };

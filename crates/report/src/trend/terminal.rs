@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 
 use skinrig_nightly::trend::report::format_number as number;
-use skinrig_nightly::trend::{Chart, Report};
+use skinrig_nightly::trend::{Chart, Report, SeriesState};
 use skinrig_text::{
     Blocks, Column as Cells, LongWords, Paint, Style as Look, WIDTH, cut, hang, sparkline, wrap,
 };
 
-use super::{Links, cause, moved, since, state, with_unit};
+use super::{Links, cause, moved, since, state_in_words, with_unit};
 use crate::document::{Block, Column, Row, Table, lines};
 use crate::format::plain;
 
@@ -103,9 +103,10 @@ fn series(report: &Report, charts: &[&Chart], style: Style) -> Table {
             cut(&plain(&chart.series.name), NAME).to_owned(),
             spark(report, chart, style),
             last.unwrap_or_else(|| "-".to_owned()),
-            state(chart).to_owned(),
+            state_in_words(chart),
         ]);
-        row.style(chart.open_excursion().map(|_| Look::Bold))
+        let stands_out = matches!(chart.state, SeriesState::Moved | SeriesState::NotMeasured);
+        row.style(stands_out.then_some(Look::Bold))
     };
     Table::of("series", "Series", columns).with(charts.iter().map(row))
 }

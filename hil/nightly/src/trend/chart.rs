@@ -14,6 +14,25 @@ const REFERENCE_DELAY: usize = 5;
 /// Consecutive nights within the limits that end an excursion.
 const RECOVERY_NIGHTS: usize = 5;
 
+/// Newest nights without a usable value that end what a series says: as many as an alarm needs.
+const UNMEASURED_NIGHTS: usize = 3;
+
+/// What is known of a series.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SeriesState {
+    /// An excursion is open.
+    Moved,
+    /// There are too few nights for a reference.
+    Learning,
+    /// The newest nights have no usable value: it may have moved.
+    NotMeasured,
+    /// Another suite that does not ask for it has taken over.
+    Dropped,
+    /// Within its reference.
+    Steady,
+}
+
 /// A series with its control chart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chart {
@@ -27,6 +46,10 @@ pub struct Chart {
     pub excursions: Vec<Excursion>,
     /// Indices of the nights at which the reference restarts.
     pub accepted: Vec<usize>,
+    /// What is known of it after the newest night.
+    pub state: SeriesState,
+    /// Number of newest nights without a usable value.
+    pub unmeasured_nights: usize,
 }
 
 /// A point of the chart.
@@ -127,6 +150,8 @@ pub fn chart(
         reference: None,
         excursions: Vec::new(),
         accepted: restarts(&series.name, nights, accepted),
+        state: SeriesState::Learning,
+        unmeasured_nights: 0,
     };
     let mut restarts = chart.accepted.clone().into_iter().peekable();
     for point in &series.points {
@@ -139,6 +164,9 @@ pub fn chart(
     }
     chart.reference = builder.reference;
     builder.finish(&mut chart);
+    let next = chart.nights.last().map_or(0, |n| n.night + 1);
+    chart.unmeasured_nights = nights.len().saturating_sub(next);
+    chart.state = chart.state(nights);
     chart
 }
 
@@ -269,6 +297,27 @@ fn set_level_after(chart: &mut Chart, at: usize) {
 }
 
 impl Chart {
+    fn state(&self, nights: &[NightSummary]) -> SeriesState {
+        if self.open_excursion().is_some() {
+            return SeriesState::Moved;
+        }
+        if self.reference.is_none() {
+            return SeriesState::Learning;
+        }
+        if self.unmeasured_nights < UNMEASURED_NIGHTS {
+            return SeriesState::Steady;
+        }
+        let asked = self.series.points.last().and_then(|p| nights.get(p.night));
+        let suites = asked.zip(nights.last());
+        let measured = self.nights.last().map(|n| n.night);
+        let is_asked_in_vain = self.series.points.last().map(|p| p.night) != measured;
+        if !is_asked_in_vain && suites.is_some_and(|(a, b)| a.suite_sha256 != b.suite_sha256) {
+            SeriesState::Dropped
+        } else {
+            SeriesState::NotMeasured
+        }
+    }
+
     /// The open excursion, if any.
     #[must_use]
     pub fn open_excursion(&self) -> Option<&Excursion> {

@@ -12,7 +12,7 @@ use crate::verdict::Verdict;
 pub struct History {
     /// Oldest first.
     pub nights: Vec<NightSummary>,
-    /// One series per metric, sorted by name.
+    /// One series per metric and unit, sorted by both.
     pub series: Vec<Series>,
     /// Accepted changes.
     pub accepted: Vec<Acceptance>,
@@ -156,9 +156,12 @@ impl History {
         }
     }
 
-    /// Appends a point to the series with this name, creating the series if needed.
+    /// Appends a point to the series with this name and unit, creating the series if needed. Values in another unit are another series:
+    /// they cannot be compared.
     pub fn add(&mut self, name: &str, unit: &str, point: Point) {
-        let at = self.series.binary_search_by(|s| s.name.as_str().cmp(name));
+        let at = self
+            .series
+            .binary_search_by(|s| (s.name.as_str(), s.unit.as_str()).cmp(&(name, unit)));
         let at = at.unwrap_or_else(|at| {
             let new = Series {
                 name: name.to_owned(),

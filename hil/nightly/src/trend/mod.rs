@@ -16,7 +16,7 @@ pub mod run_length;
 
 pub use cause::Attribution;
 pub use change::ChangeWindow;
-pub use chart::{Chart, ChartPoint, Direction, Excursion, chart};
+pub use chart::{Chart, ChartPoint, Direction, Excursion, SeriesState, chart};
 pub use history::{Acceptance, History, NightSummary, Point, Series};
 pub use reference::Reference;
 pub use report::{Alarm, Report, judge};

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::cause::{self, Attribution};
-use super::chart::{Chart, Direction, Excursion, chart};
+use super::chart::{Chart, Direction, Excursion, SeriesState, chart};
 use super::derived::ratios;
 use super::history::{History, NightSummary};
 use super::reference::MIN_NIGHTS;
@@ -58,6 +58,17 @@ impl Report {
     pub fn is_learning(&self) -> bool {
         self.charts.iter().all(|c| c.reference.is_none())
     }
+
+    /// Series of which the newest nights say nothing.
+    pub fn unmeasured(&self) -> impl Iterator<Item = &Chart> {
+        unmeasured(&self.charts)
+    }
+}
+
+fn unmeasured(charts: &[Chart]) -> impl Iterator<Item = &Chart> {
+    charts
+        .iter()
+        .filter(|c| c.state == SeriesState::NotMeasured)
 }
 
 /// Judges all series of `history` and the ratios derived from them.
@@ -79,7 +90,7 @@ pub fn judge(history: &History) -> Report {
         .iter()
         .map(|s| chart(s, &history.nights, &history.accepted, rules))
         .collect();
-    // Open excursions first, the largest first; the others by name.
+    // Open excursions first, the largest first; then those that are not measured; the others by name.
     charts.sort_by(|a, b| {
         let is_open = |c: &Chart| c.open_excursion().is_some();
         let size = |c: &Chart| {
@@ -94,7 +105,10 @@ pub fn judge(history: &History) -> Report {
         } else {
             std::cmp::Ordering::Equal
         };
+        let is_measured = |c: &Chart| c.state != SeriesState::NotMeasured;
+        let silent = is_measured(a).cmp(&is_measured(b));
         both.then(farther)
+            .then(silent)
             .then_with(|| a.series.name.cmp(&b.series.name))
     });
     let (alarms, past) = alarms(&charts, &history.nights);
@@ -220,7 +234,11 @@ pub const fn cause_name(cause: Option<Cause>) -> &'static str {
 }
 
 fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightSummary]) -> String {
+    let silent = silent(charts, nights);
     let Some(alarm) = alarms.first() else {
+        if let Some(silent) = silent {
+            return format!("not known whether all is steady: {silent}; nothing else moved");
+        }
         let learning = charts.iter().filter(|c| c.reference.is_none()).count();
         return if charts.is_empty() {
             "no trends: no night has a usable value yet".to_owned()
@@ -264,12 +282,33 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightSummary]) -> Stri
         1 => "; 1 further alarm".to_owned(),
         n => format!("; {n} further alarms"),
     };
+    let silent = silent.map_or_else(String::new, |silent| format!("; {silent}"));
     format!(
-        "{} moved ({by}){others} {when}; probable cause: {} ({}){further}",
+        "{} moved ({by}){others} {when}; probable cause: {} ({}){further}{silent}",
         first.series.name,
         cause_name(alarm.attribution.cause),
         alarm.attribution.reason,
     )
+}
+
+/// Which series the newest nights say nothing about, and since when; `None` if there are none.
+fn silent(charts: &[Chart], nights: &[NightSummary]) -> Option<String> {
+    let silent: Vec<&Chart> = unmeasured(charts).collect();
+    let first = silent.iter().max_by_key(|c| c.unmeasured_nights)?;
+    let last = &nights[first.nights.last()?.night];
+    let others = match silent.len() - 1 {
+        0 => String::new(),
+        n => format!(
+            "; so {} {n} other series",
+            if n == 1 { "has" } else { "have" }
+        ),
+    };
+    Some(format!(
+        "{} has no usable value since {} ({} nights){others}",
+        first.series.name,
+        day(last),
+        first.unmeasured_nights
+    ))
 }
 
 /// Largest number of reference nights of any series.

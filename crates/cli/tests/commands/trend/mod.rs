@@ -106,6 +106,23 @@ fn the_terminal_lists_changes_with_date_and_cause() {
 }
 
 #[test]
+fn a_check_that_is_no_longer_made_ends_the_all_clear() {
+    let nights = Nights::of(40, 40);
+    nights.add_disk(40..43, 43);
+    let trend = nights.trend(&[]).code(1);
+    assert_contains(
+        &trend.out,
+        &[
+            "not known whether all is steady",
+            "not measured for 3 nights",
+        ],
+    );
+    let page = nights.lab.text("trends.html");
+    let _ = nights.trend(&["--html", &page]).code(1);
+    assert_contains(&read(Path::new(&page)), &["not measured for 3 nights"]);
+}
+
+#[test]
 fn what_is_no_history_is_bad_input_and_left_alone() {
     let nights = Nights::of(3, 3);
     let lab = &nights.lab;

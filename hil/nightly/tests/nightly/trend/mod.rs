@@ -9,10 +9,10 @@
 mod nights;
 
 use nights::{Bench, PlantedChange};
-use skinrig_nightly::Cause;
 use skinrig_nightly::trend::report::NIGHTS_PER_FALSE_ALARM;
 use skinrig_nightly::trend::run_length::rules;
-use skinrig_nightly::trend::{Acceptance, Chart, History, Report, judge};
+use skinrig_nightly::trend::{Acceptance, Chart, History, Report, SeriesState, judge};
+use skinrig_nightly::{Cause, Verdict};
 
 const EVENTS: &str = "golden/skin/press_events";
 const LOCATED: &str = "golden/skin/located";
@@ -264,4 +264,78 @@ fn the_window_of_a_change_holds_its_first_night() {
         println!("change by {factor}: {share} %");
         assert!(share >= least, "{factor}: {share} %");
     }
+}
+
+/// A quiet history whose newest `unusable` nights are changed.
+fn ending(unusable: usize, change: impl Fn(&mut History, usize)) -> Report {
+    let mut history = Bench::new(3).history(40);
+    for night in history.nights.len() - unusable..history.nights.len() {
+        change(&mut history, night);
+    }
+    judge(&history)
+}
+
+/// Removes the value of the series in a night, or says that it means nothing.
+fn spoil(history: &mut History, series: &str, night: usize, is_invalid: bool) {
+    let named = history.series.iter_mut().find(|s| s.name == series);
+    let points = &mut named.unwrap().points;
+    for point in points.iter_mut().filter(|p| p.night == night) {
+        if is_invalid {
+            point.part = Verdict::Invalid;
+        } else {
+            point.value = None;
+        }
+    }
+}
+
+#[test]
+fn a_series_without_values_is_not_called_steady() {
+    for is_invalid in [false, true] {
+        let report = ending(10, |h, night| spoil(h, EVENTS, night, is_invalid));
+        let silent = chart(&report, EVENTS);
+        assert_eq!(silent.state, SeriesState::NotMeasured);
+        assert!(silent.unmeasured_nights >= 10);
+        assert!(
+            report.headline.contains(EVENTS) && report.headline.contains("no usable value since"),
+            "{}",
+            report.headline
+        );
+        assert_eq!(chart(&report, LOCATED).state, SeriesState::Steady);
+        // The first after the alarms.
+        assert_eq!(report.charts[0].state, SeriesState::NotMeasured);
+    }
+    // Two such nights happen: a device at fault.
+    let report = ending(2, |h, night| spoil(h, LOCATED, night, true));
+    assert_eq!(chart(&report, LOCATED).state, SeriesState::Steady);
+}
+
+#[test]
+fn checks_that_are_no_longer_made_are_missed_unless_the_suite_changed() {
+    let unasked = |history: &mut History, night: usize| {
+        let named = history.series.iter_mut().find(|s| s.name == EVENTS);
+        named.unwrap().points.retain(|p| p.night != night);
+    };
+    let report = ending(5, unasked);
+    assert_eq!(chart(&report, EVENTS).state, SeriesState::NotMeasured);
+    let report = ending(5, |history, night| {
+        unasked(history, night);
+        history.nights[night].suite_sha256 = "7".repeat(64);
+    });
+    assert_eq!(chart(&report, EVENTS).state, SeriesState::Dropped);
+    assert!(!report.headline.contains(EVENTS), "{}", report.headline);
+}
+
+#[test]
+fn values_in_another_unit_are_another_series() {
+    let mut history = Bench::new(3).history(40);
+    let at = history.series.iter().position(|s| s.name == EVENTS);
+    let points = &mut history.series[at.unwrap()].points;
+    let later = points.split_off(points.len() - 5);
+    for point in later {
+        history.add(EVENTS, "kev", point);
+    }
+    let report = judge(&history);
+    let states = report.charts.iter().filter(|c| c.series.name == EVENTS);
+    let states: Vec<_> = states.map(|c| c.state).collect();
+    assert_eq!(states, [SeriesState::NotMeasured, SeriesState::Learning]);
 }
