@@ -67,6 +67,17 @@ pub enum RecorderError {
         /// The tables.
         tables: Vec<String>,
     },
+    /// The rows of an unsealed session contradict each other.
+    #[error("{}: expected rows that agree, found {problems} that do not, first {first}: the file was changed or damaged after it was \
+        recorded; `skinrig verify` lists the differences; restore the file from a copy", path.display())]
+    Contradictory {
+        /// The session file.
+        path: PathBuf,
+        /// The first contradiction.
+        first: Box<Problem>,
+        /// Number of contradictions.
+        problems: u64,
+    },
     /// The session to resume fails verification. Nothing in it was changed.
     #[error("{}: expected a sound session to resume, found {} problem(s): {}; nothing was changed: `skinrig salvage` copies \
         the intact parts into a new session", path.display(), problems.len() as u64 + more_problems, join(problems))]

@@ -22,6 +22,7 @@ pub mod tags;
 pub mod verify;
 pub mod writer;
 
+mod checked;
 mod close_result;
 mod digest;
 #[cfg(target_os = "linux")]

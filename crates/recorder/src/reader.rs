@@ -7,7 +7,6 @@ use skinrig_model::{DeviceIdentity, DeviceRole, RigidTransform, RunHeader, Setti
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use tokio::runtime::Runtime;
 
-use crate::digest::{digest_tables, sealed_tables, tree_hash};
 use crate::error::RecorderError;
 use crate::from_row::{header_from, planned_from};
 use crate::open;
@@ -58,35 +57,6 @@ impl SessionReader {
             path,
             immutable,
             inner: Mutex::new((runtime, conn)),
-        })
-    }
-
-    /// Opens a session to compute results. Compares the rows of a sealed one with its seal: the stored bytes of cameras and poses have
-    /// checksums of their own, which are compared when they are read.
-    ///
-    /// # Errors
-    /// Those of [`open`](Self::open); [`RecorderError::Changed`].
-    pub fn open_checked(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
-        let reader = Self::open(path)?;
-        let Some(seal) = reader.seal_row()? else {
-            return Ok(reader);
-        };
-        let tables = reader.query("checking the seal", async |conn| {
-            let recorded = sealed_tables(conn).await?;
-            let found = digest_tables(conn).await?;
-            let differ = found.iter().filter(|table| !recorded.contains(table));
-            let mut names: Vec<String> = differ.map(|table| table.name.clone()).collect();
-            if names.is_empty() && tree_hash(&found) != seal.tree_sha256 {
-                names.push("seal".to_owned());
-            }
-            Ok(names)
-        })?;
-        if tables.is_empty() {
-            return Ok(reader);
-        }
-        Err(RecorderError::Changed {
-            path: reader.path,
-            tables,
         })
     }
 

@@ -82,6 +82,28 @@ pub fn verify<S: ChunkScanner>(path: impl AsRef<Path>) -> Result<VerifyReport, R
     Ok(report)
 }
 
+/// Compares the rows of a session that nothing seals with each other: header, journal, measured values.
+///
+/// # Errors
+/// [`RecorderError::Contradictory`], [`RecorderError::Unread`].
+pub(crate) fn check_unsealed(reader: &SessionReader) -> Result<(), RecorderError> {
+    let mut report = VerifyReport::default();
+    check_header(reader, &mut report);
+    check_journal(reader, &mut report);
+    truth::check_truth(reader, &mut report);
+    if let Some(failure) = report.system_failure {
+        return Err(RecorderError::Unread(failure));
+    }
+    let Some(first) = report.problems.first().cloned() else {
+        return Ok(());
+    };
+    Err(RecorderError::Contradictory {
+        path: reader.path().to_owned(),
+        first: Box::new(first),
+        problems: report.problems.len() as u64 + report.more_problems,
+    })
+}
+
 /// Makes all checks, some in threads with a connection each. The order of problems does not depend on the threads.
 fn check_all<S: ChunkScanner>(reader: &SessionReader) -> VerifyReport {
     let (header, formats) = section(|report| check_header(reader, report));

@@ -115,6 +115,9 @@ impl AlignedSession {
                 declared: found.declared,
             })
         }));
+        if self.session.reader.seal()?.is_none() {
+            analysis.warnings.push(WarningCause::NotSealed.into());
+        }
         let reactions = felt.as_ref().and_then(|f| f.reactions.as_ref());
         let stops = reactions.filter(|r| r.reaction == Reaction::Stop);
         analysis.warnings.extend(stops.and_then(|r| {

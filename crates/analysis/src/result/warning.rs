@@ -239,6 +239,12 @@ pub enum WarningCause {
         /// Of these, presses that a rule excludes.
         excluded: u32,
     },
+    /// Nothing seals the session.
+    #[error(
+        "the session is not sealed: its run was cut off, or its seal was removed, and only some changes of its rows would show; \
+         `skinrig resume` continues a run that was cut off"
+    )]
+    NotSealed,
     /// The data decided when to stop.
     #[error(
         "the looks decided when to end: 95 % intervals do not allow for that, those of the looks do ({looks} of {declared} taken)"

@@ -37,10 +37,18 @@ fn measured_positions_that_the_poses_contradict_are_reported() {
     let path = text(&session);
     let sound = skinrig(&["verify", &path]).code(0).out;
     assert!(sound.contains("sound, but not sealed"), "{sound}");
+    let analyzed = skinrig(&["analyze", &path, "--json"]).code(0).json();
+    let warnings = analyzed["analysis"]["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|w| w["kind"] == "not_sealed"));
     let verdict = "UPDATE attempt SET verdict = 'missed', reason = 'unlucky' WHERE press = 3";
     change(&session, verdict);
     let missed = skinrig(&["verify", &path]).code(4).out;
     assert!(missed.contains("never attempted"), "{missed}");
+    skinrig(&["analyze", &path]).code(2).expect_stderr(&[
+        "expected rows that agree",
+        "press 4",
+        "skinrig verify",
+    ]);
     change(
         &session,
         "UPDATE attempt SET verdict = 'valid', reason = NULL WHERE press = 3",

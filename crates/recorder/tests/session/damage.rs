@@ -126,9 +126,36 @@ fn changed_rows_of_a_sealed_session_are_refused() {
         );
         assert_eq!(report.is_whole(), !sealed_rows, "{statement}");
     }
-    // A session that was never sealed has nothing to compare with.
+    // The digests of a seal that is gone, as after a power cut, still hold.
     change(&path, &["DELETE FROM seal"]);
     SessionReader::open_checked(&path).unwrap();
+    let role = "UPDATE press SET role = 'calibrate' WHERE id = 2";
+    change(&path, &[role]);
+    match SessionReader::open_checked(&path) {
+        Err(RecorderError::Changed { tables, .. }) => assert_eq!(tables, ["press"]),
+        other => panic!("{other:?}"),
+    }
+    // Without them, rows can only contradict each other.
+    change(
+        &path,
+        &[
+            "DELETE FROM table_digest",
+            "UPDATE press SET role = 'score' WHERE id = 2",
+        ],
+    );
+    SessionReader::open_checked(&path).unwrap();
+    change(
+        &path,
+        &["UPDATE session SET protocol_text = protocol_text || '#'"],
+    );
+    let refused = SessionReader::open_checked(&path);
+    assert!(
+        matches!(
+            &refused,
+            Err(RecorderError::Contradictory { problems: 1, .. })
+        ),
+        "{refused:?}"
+    );
 }
 
 #[test]

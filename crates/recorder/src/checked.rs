@@ -1,0 +1,46 @@
+//! Opens a session to compute results, once its rows agree with its seal or, without one, with each other.
+
+use std::path::Path;
+
+use crate::digest::{digest_tables, sealed_tables, tree_hash};
+use crate::error::RecorderError;
+use crate::reader::SessionReader;
+use crate::verify::check_unsealed;
+
+impl SessionReader {
+    /// Opens a session to compute results. Compares the rows of a sealed one with its seal, and those of an unsealed one with each other:
+    /// the plan with the presses, the poses with the measured values. The stored bytes of cameras and poses have checksums of their own,
+    /// which are compared when they are read.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open); [`RecorderError::Changed`]; [`RecorderError::Contradictory`].
+    pub fn open_checked(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
+        let reader = Self::open(path)?;
+        let seal = reader.seal_row()?;
+        let tables = reader.query("checking the seal", async |conn| {
+            let recorded = sealed_tables(conn).await?;
+            // A power cut leaves them behind without a seal.
+            if seal.is_none() && recorded.is_empty() {
+                return Ok(Vec::new());
+            }
+            let found = digest_tables(conn).await?;
+            let differ = found.iter().filter(|table| !recorded.contains(table));
+            let mut names: Vec<String> = differ.map(|table| table.name.clone()).collect();
+            let tree_sha256 = seal.as_ref().map(|seal| seal.tree_sha256);
+            if names.is_empty() && tree_sha256.is_some_and(|sealed| tree_hash(&found) != sealed) {
+                names.push("seal".to_owned());
+            }
+            Ok(names)
+        })?;
+        if tables.is_empty() {
+            if seal.is_none() {
+                check_unsealed(&reader)?;
+            }
+            return Ok(reader);
+        }
+        Err(RecorderError::Changed {
+            path: reader.path().to_owned(),
+            tables,
+        })
+    }
+}
