@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use skinrig_analysis::result::PressResult;
 use skinrig_model::{CameraId, CdEvent, Point2, PressRole, PressTiming, Verdict};
-use skinrig_recorder::RecorderError;
+use skinrig_recorder::{ChunkMeta, RecorderError};
 
 use super::answers::{Answer, Answers, ChallengeSelection, hash, hex};
 use super::error::ChallengeError;
@@ -19,8 +19,8 @@ use crate::presses::recorded_us;
 use crate::source::{Source, TableName};
 use crate::table::{Column, Kind, Layout, Table, TableWriter, Values};
 
-/// Events from this long before the contact to this long after the release, µs; at most half the pause to the press before or after:
-/// events that two presses share would tell their order, and with it their places.
+/// Events from this long before the contact to this long after the release, µs; less if a press has less of its own. All presses have the
+/// same margin: events that two presses share, and margins that follow from pauses, would tell their order, and with it their places.
 const MARGIN_US: f64 = 500_000.0;
 
 /// Description of a challenge, for people and programs.
@@ -44,7 +44,7 @@ pub(super) struct Description {
 }
 
 const TASK: &str = "Locate the presses with role `score`, in mm in the skin frame, from the events of both cameras. Events are \
-    those from 0.5 s before the contact to 0.5 s after the release, or half the pause to the next press if that is shorter; t_us counts from the contact. Write a CSV file with the \
+    those from 0.5 s before the contact to 0.5 s after the release, or, for all presses alike, half the shortest pause; t_us counts from the contact. Write a CSV file with the \
     columns press, x_mm, y_mm, one row for each of these presses, cells empty if not located; optionally the 95 % region as \
     region_major_mm, region_minor_mm (semi-axes) and region_angle_deg (of the longer one, counter-clockwise from x).";
 
@@ -97,8 +97,8 @@ pub struct ChallengeFiles {
 pub(super) struct Press<'a> {
     pub row: &'a PressResult,
     timing: PressTiming,
-    /// Before the contact and after the release, µs.
-    margins_us: [f64; 2],
+    /// Before the contact and after the release, µs; the same for all.
+    margin_us: f64,
     pub truth: Point2,
 }
 
@@ -122,9 +122,8 @@ impl Press<'_> {
         };
         let us = |t| recorded_us(source, clock, camera.index(), t);
         let contact = us(self.timing.contact);
-        let [before_us, after_us] = self.margins_us;
-        let from = (contact - before_us).ceil().max(0.0) as u64;
-        let to = (us(self.timing.release) + after_us).max(1.0) as u64 - 1;
+        let from = (contact - self.margin_us).ceil().max(0.0) as u64;
+        let to = (us(self.timing.release) + self.margin_us).max(1.0) as u64 - 1;
         Ok((contact, events(camera, (from, to))?))
     }
 }
@@ -214,7 +213,7 @@ pub(super) fn chosen<'a>(
             because: analysis.invalid_because(),
         });
     }
-    let presses = shuffled(&analysis.presses, salt);
+    let mut presses = shuffled(&analysis.presses, salt);
     let scored = presses.iter().filter(|p| p.is_scored()).count();
     let calibrating = presses.len() - scored;
     if scored == 0 || calibrating == 0 {
@@ -222,6 +221,10 @@ pub(super) fn chosen<'a>(
             calibrating,
             scored,
         });
+    }
+    let margin_us = margin_us(source, &presses, &analysis.presses)?;
+    for press in &mut presses {
+        press.margin_us = margin_us;
     }
     Ok(presses)
 }
@@ -271,13 +274,12 @@ fn shuffled(rows: &[PressResult], salt: [u8; 32]) -> Vec<Press<'_>> {
             row.verdict == Verdict::Valid || row.rule().is_some_and(|r| r.is_on_data())
         }
     };
-    let all: Vec<PressTiming> = rows.iter().filter_map(|row| row.timing).collect();
     let presses = rows.iter().filter(|row| usable(row)).filter_map(|row| {
         let timing = row.timing?;
         Some(Press {
             row,
             timing,
-            margins_us: margins_us(&timing, &all),
+            margin_us: MARGIN_US,
             truth: row.truth?,
         })
     });
@@ -291,8 +293,53 @@ fn shuffled(rows: &[PressResult], salt: [u8; 32]) -> Vec<Press<'_>> {
     presses
 }
 
-/// Margins of a press among `all`: no event is in the margins of two.
-fn margins_us(own: &PressTiming, all: &[PressTiming]) -> [f64; 2] {
+/// The margin of all presses: half the shortest pause beside one of them, and no more than what was recorded about each.
+fn margin_us(
+    source: &Source<'_>,
+    presses: &[Press<'_>],
+    rows: &[PressResult],
+) -> Result<f64, ExportError> {
+    let all: Vec<PressTiming> = rows.iter().filter_map(|row| row.timing).collect();
+    let pauses = presses.iter().map(|p| half_pause_us(&p.timing, &all));
+    let mut margin_us = pauses.fold(MARGIN_US, f64::min);
+    for camera in CameraId::ALL {
+        let clock = source
+            .analysis
+            .and_then(|(a, _)| a.clocks[camera.index()].as_ref());
+        let Some(clock) = clock else { continue };
+        let legs = recorded(&source.reader.chunk_index(camera)?);
+        for p in presses {
+            let us = |t| recorded_us(source, clock, camera.index(), t);
+            let (contact, release) = (us(p.timing.contact), us(p.timing.release));
+            let own = legs
+                .iter()
+                .find(|(first, last)| (*first..=*last).contains(&contact));
+            let recorded_us =
+                own.map_or(0.0, |(first, last)| (contact - first).min(last - release));
+            margin_us = margin_us.min(recorded_us.max(0.0));
+        }
+    }
+    Ok(margin_us)
+}
+
+/// First and last time of each leg of a camera's stream, µs.
+fn recorded(chunks: &[ChunkMeta]) -> Vec<(f64, f64)> {
+    let mut legs: Vec<(f64, f64)> = Vec::new();
+    for chunk in chunks {
+        let Some((first, last)) = chunk.facts.first_us.zip(chunk.facts.last_us) else {
+            continue;
+        };
+        let (first, last) = (first as f64, last as f64);
+        match legs.last_mut() {
+            Some(leg) if chunk.restart_us.is_none() => leg.1 = last,
+            _ => legs.push((first, last)),
+        }
+    }
+    legs
+}
+
+/// Half the shorter pause between a press and those before and after it among `all`.
+fn half_pause_us(own: &PressTiming, all: &[PressTiming]) -> f64 {
     let ends = all.iter().map(|t| t.release);
     let before = ends.filter(|t| *t <= own.contact).max();
     let begins = all.iter().map(|t| t.contact);
@@ -301,10 +348,10 @@ fn margins_us(own: &PressTiming, all: &[PressTiming]) -> [f64; 2] {
         before.map(|t| own.contact - t),
         after.map(|t| t - own.release),
     ];
-    pauses.map(|pause| {
-        let half_us = pause.map(|pause| 0.5e-3 * pause.0 as f64);
-        half_us.map_or(MARGIN_US, |us| us.min(MARGIN_US))
-    })
+    let halves = pauses.into_iter().flatten();
+    halves
+        .map(|pause| 0.5e-3 * pause.0 as f64)
+        .fold(f64::INFINITY, f64::min)
 }
 
 fn press_table(presses: &[Press<'_>]) -> Table {
@@ -401,7 +448,8 @@ fn write(folder: &Folder, suffix: &str, text: &str) -> Result<PathBuf, ExportErr
 
 #[cfg(test)]
 mod tests {
-    use skinrig_model::HostTime;
+    use skinrig_model::{ChunkFacts, HostTime};
+    use skinrig_recorder::Codec;
 
     use super::*;
 
@@ -421,14 +469,34 @@ mod tests {
     #[test]
     fn no_event_is_in_two_presses() {
         let all = [press(0, 200), press(500, 700), press(5_000, 5_200)];
-        let margins = all.map(|own| margins_us(&own, &all));
-        assert_eq!(
-            margins,
-            [
-                [MARGIN_US, 150_000.0],
-                [150_000.0, MARGIN_US],
-                [MARGIN_US, MARGIN_US]
-            ]
-        );
+        let halves = all.map(|own| half_pause_us(&own, &all));
+        assert_eq!(halves, [150_000.0, 150_000.0, 2_150_000.0]);
+    }
+
+    #[test]
+    fn every_leg_has_its_own_ends() {
+        let chunk = |first_us, last_us, restart_us| ChunkMeta {
+            camera: CameraId::One,
+            seq: 0,
+            host_time: HostTime::ZERO,
+            lost_before: 0,
+            lost_time: None,
+            codec: Codec::None,
+            raw_bytes: 0,
+            stored_bytes: 0,
+            raw_crc32: 0,
+            facts: ChunkFacts {
+                first_us: Some(first_us),
+                last_us: Some(last_us),
+                ..ChunkFacts::default()
+            },
+            restart_us,
+        };
+        let chunks = [
+            chunk(10, 20, None),
+            chunk(21, 30, None),
+            chunk(90, 99, Some(80)),
+        ];
+        assert_eq!(recorded(&chunks), [(10.0, 30.0), (90.0, 99.0)]);
     }
 }
