@@ -94,6 +94,19 @@ const GEOMETRIC: [LevelBias; 4] = [
     LevelBias::new(-62.73, -63.97, -61.48),
 ];
 
+/// Where the differences between levels are measured: `motion` by default, depth 2 mm, the published skin and cameras. A shallow press
+/// is visible to the geometric level long before the optical one sees it, so that they hold for nothing else.
+pub const CONDITIONS: &str = "2 mm deep, indented at 20 mm/s, held 150 ms, on the published skin";
+
+/// Whether presses are made under [`CONDITIONS`], within a tenth of each: depths in mm, speed in mm/s, hold in ms.
+#[must_use]
+pub fn is_measured_for(depths_mm: &[f64], indent_mm_s: f64, hold_ms: f64) -> bool {
+    let near = |found: f64, measured: f64| (found - measured).abs() <= 0.1 * measured;
+    depths_mm.iter().all(|depth| near(*depth, 2.0))
+        && near(indent_mm_s, 20.0)
+        && near(hold_ms, 150.0)
+}
+
 /// How far `level` is from the optical one in `figure`; `None` if it does not model what the figure needs.
 #[must_use]
 pub const fn level_bias(level: SimLevel, figure: SceneFigure) -> Option<LevelBias> {

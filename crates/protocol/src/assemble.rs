@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
+use skinrig_model::level_bias::is_measured_for;
 use skinrig_model::pulse::MAX_MARKED_PRESS;
 use skinrig_model::{PulseTrain, SkinOutline, StereoGeometry};
 use skinrig_settings::{Collector, Diagnostics, Field, Settings, Span, open};
@@ -158,7 +159,18 @@ fn assemble(
 
     let (path_kind, locations) = path?;
     let (depths_mm, roles, outline) = (depths_mm?, roles?, outline?);
-    let scene = keys.scene?.scene(outline.centre);
+    let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
+    let is_measured = outline == SkinOutline::PAPER
+        && motion
+            .indent
+            .zip(motion.hold)
+            .is_some_and(|(indent, hold)| {
+                let speed_mm_s = indent.speed_mm_s(deepest_mm);
+                is_measured_for(&depths_mm, speed_mm_s, 1e3 * hold.as_secs_f64())
+            });
+    let scene = keys.scene?;
+    scene.within_measured(is_measured, root.at("scene"), out);
+    let scene = scene.scene(outline.centre, is_measured);
     let calibrate_at = declared(keys.calibrate_at, |keys| {
         let cameras = scene
             .cameras

@@ -1,6 +1,8 @@
 //! Keys of the simulated scene.
 
-use skinrig_model::level_bias::{LevelBias, SceneFigure, Tolerance, cheapest_level, level_bias};
+use skinrig_model::level_bias::{
+    CONDITIONS, LevelBias, SceneFigure, Tolerance, cheapest_level, level_bias,
+};
 use skinrig_model::{HostDuration, Point2, SceneNeed, ScenePart, SimLevel};
 use skinrig_settings::{Collector, Field, Settings};
 
@@ -107,8 +109,9 @@ pub(crate) struct SceneCameras {
 }
 
 impl SceneKeys {
-    /// The scene with its level decided. Cameras aim at `centre` unless the file says otherwise.
-    pub(crate) fn scene(self, centre: Point2) -> Scene {
+    /// The scene with its level decided. Cameras aim at `centre` unless the file says otherwise. Differences between levels are known for
+    /// presses as measured.
+    pub(crate) fn scene(self, centre: Point2, is_measured: bool) -> Scene {
         let tolerances = self.tolerances.as_ref().map(ToleranceKeys::all);
         let needs = match (self.needs, self.level, &tolerances) {
             (Some(needs), ..) => needs,
@@ -116,8 +119,8 @@ impl SceneKeys {
             (None, ..) => Vec::new(),
         };
         let tolerances = tolerances.unwrap_or_default();
-        // Differences are measured for the published cameras only.
-        let unmeasured = self.cameras.is_some() && !tolerances.is_empty();
+        let is_known = is_measured && self.cameras.is_none();
+        let unmeasured = !is_known && !tolerances.is_empty();
         let is_optical = self.skin.is_some() || self.parts.is_some();
         let own_level = (is_optical || unmeasured).then_some(SimLevel::Optical);
         Scene {
@@ -188,6 +191,25 @@ impl SceneKeys {
 }
 
 impl SceneKeys {
+    /// Refuses a named level with tolerances where the differences between levels are not measured.
+    pub(crate) fn within_measured(&self, is_measured: bool, field: &Field, out: &mut Collector) {
+        let Some(level) = self.level.filter(|level| *level < SimLevel::Optical) else {
+            return;
+        };
+        if is_measured || self.tolerances.is_none() {
+            return;
+        }
+        let at = field.at("level");
+        out.error(
+            at.span,
+            "scene.level",
+            "the level's differences are not measured for these presses",
+        )
+        .expected(format!("`optical`, or presses as measured: {CONDITIONS}"))
+        .found(format!("`{level}` for other presses"))
+        .help("remove `level`: the optical level is chosen");
+    }
+
     fn within_tolerances(&self, level: SimLevel, field: &Field, out: &mut Collector) {
         let tolerances = self.tolerances.as_ref().map(ToleranceKeys::all);
         let is_measured = self.cameras.is_none() || level == SimLevel::Optical;

@@ -42,13 +42,47 @@ fn the_cheapest_level_within_needs_and_tolerances_is_taken() {
         ),
         ("parts: [readout]", Optical),
         (CAMERAS, Geometric),
-        // Differences are measured for the published cameras only.
+        // Levels are compared for the published cameras only.
         (
             &format!("tolerances: {{event_rate: 30 %}}\n  {CAMERAS}"),
             Optical,
         ),
     ] {
         assert_eq!(level(scene), expected, "{scene}");
+    }
+}
+
+#[test]
+fn where_levels_are_not_compared_tolerances_take_the_optical_one() {
+    let with = |scene: &str, change: (&str, &str)| {
+        let text = shipped("demo.yaml").replace(
+            "  needs: [event_rates, localisation, optical_error]\n",
+            &format!("  {scene}\n"),
+        );
+        assert!(text.contains(change.0));
+        parse(&text.replace(change.0, change.1), &[])
+    };
+    for change in [
+        ("depth: 2 mm", "depth: 1 mm"),
+        ("depth: 2 mm", "depths: [2 mm, 2.5 mm]"),
+        ("hold: 150 ms", "hold: 200 ms"),
+        ("indent: 20 mm/s", "indent: 25 mm/s"),
+        (
+            "outline: paper",
+            "outline: {centre: [10 mm, 2 mm], width: 90 mm, height: 90 mm, chamfer: 0 mm, radius: 10 mm}",
+        ),
+    ] {
+        let tolerant = "tolerances: {event_rate: 30 %}";
+        match with(tolerant, change) {
+            Ok(protocol) => assert_eq!(protocol.scene.level, SimLevel::Optical, "{change:?}"),
+            Err(e) => panic!("{change:?}: {e}"),
+        }
+        let named = with(&format!("{tolerant}\n  level: geometric"), change);
+        let error = named.unwrap_err().to_string();
+        assert!(error.contains("not measured for these presses"), "{error}");
+        // Without tolerances, nobody relies on the differences.
+        let level = with("needs: [motion]", change).unwrap().scene.level;
+        assert_eq!(level, SimLevel::Kinematic);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Owns the first section of the page: headline and metrics, counts, remarks, exclusions, provenance.
 
 use skinrig_analysis::result::Analysis;
-use skinrig_model::level_bias::{LevelBias, SceneFigure};
+use skinrig_model::level_bias::{CONDITIONS, LevelBias, SceneFigure};
 
 use super::{findings, notices};
 use crate::derive;
@@ -259,7 +259,8 @@ fn provenance(p: &Provenance, analysis_version: u32) -> Vec<Fact> {
             format!("{name} {mean:+} {unit} [{low}, {high}]")
         };
         let all: Vec<String> = p.differences_from_optical.iter().map(difference).collect();
-        let fact = plain("minus the optical level", &all.join("; "));
+        let measured = format!("{} (measured {CONDITIONS})", all.join("; "));
+        let fact = plain("minus the optical level", &measured);
         facts.push(fact.wide(true));
     }
     if !p.overrides.is_empty() {
