@@ -8,12 +8,12 @@ use skinrig_text::{
     Blocks, Column as Cells, LongWords, Paint, Style as Look, WIDTH, cut, hang, sparkline, wrap,
 };
 
-use super::{Links, cause, moved, since, state_in_words, with_unit};
+use super::{Links, cause, moved, since, state, with_unit};
 use crate::document::{Block, Column, Row, Table, lines};
 use crate::format::plain;
 
 /// Columns of the name of a series; ASCII has no mark for a cut.
-const NAME: usize = 36;
+const NAME: usize = 35;
 /// Nights in a sparkline.
 const SPARK: usize = 20;
 /// Columns and rows of a chart.
@@ -103,7 +103,10 @@ fn series(report: &Report, charts: &[&Chart], style: Style) -> Table {
             cut(&plain(&chart.series.name), NAME).to_owned(),
             spark(report, chart, style),
             last.unwrap_or_else(|| "-".to_owned()),
-            state_in_words(chart),
+            match chart.state {
+                SeriesState::NotMeasured => "no value".to_owned(),
+                _ => state(chart).to_owned(),
+            },
         ]);
         let stands_out = matches!(chart.state, SeriesState::Moved | SeriesState::NotMeasured);
         row.style(stands_out.then_some(Look::Bold))

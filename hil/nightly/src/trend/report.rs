@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::cause::{self, Attribution};
 use super::chart::{Chart, Direction, Excursion, SeriesState, chart};
-use super::derived::ratios;
+use super::derived::{RATIO, ratios};
 use super::history::{History, NightSummary};
 use super::reference::MIN_NIGHTS;
 use super::run_length::{Rule, rules};
@@ -294,7 +294,18 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightSummary]) -> Stri
 /// Which series the newest nights say nothing about, and since when; `None` if there are none.
 fn silent(charts: &[Chart], nights: &[NightSummary]) -> Option<String> {
     let silent: Vec<&Chart> = unmeasured(charts).collect();
-    let first = silent.iter().max_by_key(|c| c.unmeasured_nights)?;
+    // A ratio is missing because of what it is made of.
+    let is_measured = |c: &Chart| c.series.unit != RATIO;
+    let rank = |c: &&&Chart| (is_measured(c), c.unmeasured_nights);
+    let first = silent.iter().rev().max_by_key(rank)?;
+    let is_other =
+        |c: &&Chart| c.series.name == first.series.name && c.series.unit != first.series.unit;
+    let unit = charts
+        .iter()
+        .find(is_other)
+        .map_or_else(String::new, |other| {
+            format!(" in {}, now in {},", first.series.unit, other.series.unit)
+        });
     let last = &nights[first.nights.last()?.night];
     let others = match silent.len() - 1 {
         0 => String::new(),
@@ -304,7 +315,7 @@ fn silent(charts: &[Chart], nights: &[NightSummary]) -> Option<String> {
         ),
     };
     Some(format!(
-        "{} has no usable value since {} ({} nights){others}",
+        "{}{unit} has no usable value since {} ({} nights){others}",
         first.series.name,
         day(last),
         first.unmeasured_nights

@@ -338,4 +338,9 @@ fn values_in_another_unit_are_another_series() {
     let states = report.charts.iter().filter(|c| c.series.name == EVENTS);
     let states: Vec<_> = states.map(|c| c.state).collect();
     assert_eq!(states, [SeriesState::NotMeasured, SeriesState::Learning]);
+    assert!(
+        report.headline.contains("now in kev"),
+        "{}",
+        report.headline
+    );
 }
