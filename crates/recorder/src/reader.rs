@@ -190,6 +190,11 @@ impl SessionReader {
     /// If the file is damaged or its header is not yet written.
     pub fn header(&self) -> Result<RunHeader, RecorderError> {
         const DOING: &str = "reading its header";
+        // A session that begins gets all these rows at once: whoever reads this one finds the others.
+        let mut header = self
+            .query_all(DOING, "SELECT * FROM session", header_from)?
+            .pop()
+            .ok_or_else(|| self.no_header())?;
         let axes = self.query_all(
             DOING,
             "SELECT * FROM robot_from_skin ORDER BY axis",
@@ -205,10 +210,6 @@ impl SessionReader {
             "SELECT * FROM press ORDER BY id",
             planned_from,
         )?;
-        let mut header = self
-            .query_all(DOING, "SELECT * FROM session", header_from)?
-            .pop()
-            .ok_or_else(|| self.no_header())?;
         let [(x, tx), (y, ty), (z, tz)] = axes[..] else {
             return Err(self.damaged("robot_from_skin".into(), "3 rows", axes.len().to_string()));
         };

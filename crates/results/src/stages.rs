@@ -116,7 +116,7 @@ impl AlignedSession {
             })
         }));
         if self.session.reader.seal()?.is_none() {
-            analysis.warnings.push(WarningCause::NotSealed.into());
+            analysis.warnings.insert(0, WarningCause::NotSealed.into());
         }
         let reactions = felt.as_ref().and_then(|f| f.reactions.as_ref());
         let stops = reactions.filter(|r| r.reaction == Reaction::Stop);

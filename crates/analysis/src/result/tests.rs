@@ -250,6 +250,11 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "no scored press was attempted, so there are no metrics",
         ),
         (
+            json!({"kind": "not_sealed"}),
+            "not sealed: the run was cut off, or the seal removed, and not every changed row would show; `skinrig resume` \
+             continues it",
+        ),
+        (
             json!({"kind": "sequential_looks", "looks": 2, "declared": 5}),
             "the looks decided when to end: 95 % intervals do not allow for that, those of the looks do (2 of 5 taken)",
         ),

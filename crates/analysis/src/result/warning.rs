@@ -241,8 +241,7 @@ pub enum WarningCause {
     },
     /// Nothing seals the session.
     #[error(
-        "the session is not sealed: its run was cut off, or its seal was removed, and only some changes of its rows would show; \
-         `skinrig resume` continues a run that was cut off"
+        "not sealed: the run was cut off, or the seal removed, and not every changed row would show; `skinrig resume` continues it"
     )]
     NotSealed,
     /// The data decided when to stop.

@@ -39,7 +39,7 @@ fn measured_positions_that_the_poses_contradict_are_reported() {
     assert!(sound.contains("sound, but not sealed"), "{sound}");
     let analyzed = skinrig(&["analyze", &path, "--json"]).code(0).json();
     let warnings = analyzed["analysis"]["warnings"].as_array().unwrap();
-    assert!(warnings.iter().any(|w| w["kind"] == "not_sealed"));
+    assert_eq!(warnings[0]["kind"], "not_sealed");
     let verdict = "UPDATE attempt SET verdict = 'missed', reason = 'unlucky' WHERE press = 3";
     change(&session, verdict);
     let missed = skinrig(&["verify", &path]).code(4).out;

@@ -1,5 +1,6 @@
 //! `skinrig online`, and touch felt while recording: what a replay prints, how presses react, sessions without enough to learn from.
 
+use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
@@ -162,18 +163,20 @@ fn sent_over_lsl_and_dds(lab: &Lab, lines: &str) {
 #[cfg(unix)]
 fn another_program_follows_what_is_felt() {
     let lab = Lab::new();
-    // It connects while the run learns, at the latest.
     let place = lab.text("s");
-    let follower = program(&["watch", &place, "--touches", "--every", "5 ms"])
+    let mut follower = program(&["watch", &place, "--touches", "--every", "5 ms"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
+    // It connects while the run learns, at the latest.
+    let mut said = BufReader::new(follower.stderr.take().unwrap());
+    let mut waited = String::new();
+    said.read_line(&mut waited).unwrap();
+    assert!(waited.contains("no run yet"), "{waited}");
     let session = session_with(&lab, &["--set", "online.react.then=lift"]);
     let output = follower.wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    let waited = String::from_utf8(output.stderr).unwrap();
-    assert!(waited.contains("no run yet"), "{waited}");
     let facts = |t_s: f64, rest: Value| (format!("{t_s:.6}"), rest.to_string());
     let lines = String::from_utf8(output.stdout).unwrap();
     let followed: Vec<_> = lines
