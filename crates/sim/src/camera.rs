@@ -16,7 +16,7 @@ use crate::byte_encoder::{ByteEncoder, CameraFaults, Encoding, Interval};
 use crate::camera_stream::StreamState;
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{self, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS};
+use crate::faults::{self, FaultTrigger, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS};
 use crate::line::LineEdge;
 use crate::pattern::ScanModel;
 use crate::random::{Purpose, Stream};
@@ -81,8 +81,11 @@ pub(crate) struct SimCamera {
     encoding: Encoding,
     /// Whether every poll encodes all there is: the caller reads the open chunk, or there is next to nothing to encode.
     is_prompt: bool,
-    /// Whether the cable is pulled, and whether the host has noticed.
-    unplugged: bool,
+    /// Whether the last interval has a fault, or is so long that bytes may be lost: what becomes of it belongs to this time.
+    is_eventful: bool,
+    /// Whether bytes were lost that no chunk handed over tells of.
+    has_lost: bool,
+    /// Whether the host has noticed that the cable is pulled.
     gone: bool,
 }
 
@@ -126,7 +129,8 @@ impl SimCamera {
             batches: 0,
             encoding: Encoding::new(ByteEncoder::new(id, config.camera_clock)),
             is_prompt: false,
-            unplugged: false,
+            is_eventful: false,
+            has_lost: false,
             gone: false,
         }
     }
@@ -224,7 +228,13 @@ impl SimCamera {
             losses: take_occurred(&world, &mut self.lost),
             steps: take_occurred(&world, &mut self.steps),
         };
-        self.unplugged = faults.unplugged_ns.is_some();
+        let now_ns = world.grid() * GRID_NS;
+        let is_stormy = |t: &i64| now_ns - t <= 2 * STORM_NS;
+        self.is_eventful = faults.unplugged_ns.is_some()
+            || !faults.losses.is_empty()
+            || !faults.steps.is_empty()
+            || faults.storms_ns.iter().any(is_stormy)
+            || tips.len() > BATCH_STEPS;
         self.waiting_steps += tips.len().saturating_sub(1);
         self.waiting.push(Interval {
             tips,
@@ -248,6 +258,7 @@ impl SimCamera {
         }
         chunks.extend(encoder.out.ready.drain(..));
         self.gone = encoder.gone;
+        self.has_lost = encoder.out.lost_before > 0 || encoder.out.to_lose > 0;
         drop(encoder);
         if self.gone {
             return Err(self.gone_error());
@@ -377,8 +388,7 @@ impl EventCamera for SimCamera {
 
     fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         self.observe();
-        // The host notices at once that a camera is gone.
-        if self.is_prompt || self.unplugged {
+        if self.is_prompt || self.is_eventful || self.has_lost {
             self.catch_up();
         }
         if self.waiting_steps >= BATCH_STEPS {
