@@ -68,7 +68,7 @@ pub enum RecorderError {
         tables: Vec<String>,
     },
     /// The rows of an unsealed session contradict each other.
-    #[error("{}: expected rows that agree, found {problems} that do not, first {first}: the file was changed or damaged after it was \
+    #[error("{}: expected rows that agree, found {problems} that do not, the first: {first}; the file was changed or damaged after it was \
         recorded; `skinrig verify` lists the differences; restore the file from a copy", path.display())]
     Contradictory {
         /// The session file.

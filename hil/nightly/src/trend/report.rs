@@ -310,12 +310,12 @@ fn silent(charts: &[Chart], nights: &[NightSummary]) -> Option<String> {
     let others = match silent.len() - 1 {
         0 => String::new(),
         n => format!(
-            "; so {} {n} other series",
+            "; nor {} {n} other series",
             if n == 1 { "has" } else { "have" }
         ),
     };
     Some(format!(
-        "{}{unit} has no usable value since {} ({} nights){others}",
+        "{}{unit} has had no usable value since {} ({} nights){others}",
         first.series.name,
         day(last),
         first.unmeasured_nights
