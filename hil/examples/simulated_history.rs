@@ -31,6 +31,7 @@ fn main() {
             series,
             from,
             factor,
+            growth: 0.0,
         });
     }
     for at in 0..120 {

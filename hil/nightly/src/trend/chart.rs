@@ -4,6 +4,7 @@ use serde::Serialize;
 use skinrig_model::quantile;
 
 use super::change::{self, ChangeWindow};
+use super::drift;
 use super::history::{Acceptance, NightSummary, Point, Series};
 use super::reference::{MAX_NIGHTS, MIN_NIGHTS, Reference, Sample};
 use super::run_length::Rule;
@@ -95,15 +96,16 @@ impl Direction {
 /// A period in which a series was outside its reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Excursion {
-    /// Index of the night that raised the alarm.
+    /// Direction of the change.
     pub way: Direction,
-    /// Index of the last night of the excursion, which ends by recovery or acceptance; `None`:
-    /// still open.
+    /// Whether the series drifted while its reference was learned; otherwise it changed within a few nights.
+    pub is_drift: bool,
+    /// Index of the night that raised the alarm.
     pub raised: usize,
     /// Index of the last night of the excursion, ended by recovery or acceptance; `None`: still
     /// open.
     pub ended: Option<usize>,
-    /// When the change began.
+    /// When the change began. That of a drift is only known to follow the first nights of the reference.
     pub change: ChangeWindow,
     /// Centre of the reference.
     pub before: f64,
@@ -118,6 +120,8 @@ struct ChartBuilder {
     learned: Vec<Sample>,
     waiting: Vec<Sample>,
     reference: Option<Reference>,
+    /// Whether the reference stays as it is, because later nights drift away from it.
+    is_frozen: bool,
     /// Scores against the current reference, oldest first.
     scores: Vec<f64>,
     open: Option<usize>,
@@ -140,6 +144,7 @@ pub fn chart(
         learned: Vec::new(),
         waiting: Vec::new(),
         reference: None,
+        is_frozen: false,
         scores: Vec::new(),
         open: None,
         from: 0,
@@ -186,6 +191,7 @@ impl ChartBuilder {
         self.learned.clear();
         self.waiting.clear();
         self.reference = None;
+        self.is_frozen = false;
         self.scores.clear();
         self.from = chart.nights.len();
     }
@@ -204,7 +210,11 @@ impl ChartBuilder {
             score,
         });
         self.judge(chart);
-        self.learn(sample);
+        if self.learn(sample)
+            && let Some(way) = drift::direction(&self.learned, self.is_count)
+        {
+            self.freeze(chart, way);
+        }
     }
 
     /// Opens and closes excursions.
@@ -233,32 +243,67 @@ impl ChartBuilder {
         else {
             return;
         };
-        let last = chart.nights.len() - 1;
-        self.open = Some(chart.excursions.len());
-        chart.excursions.push(Excursion {
-            way,
-            raised: chart.nights[last].night,
-            ended: None,
-            change: change::locate(&chart.nights[self.from..], way),
-            before: reference.centre,
-            after: f64::NAN,
-        });
+        self.open(chart, way, false, reference.centre);
     }
 
-    /// Adds a value to the reference once it has waited long enough and no excursion is open.
-    fn learn(&mut self, sample: Sample) {
+    fn open(&mut self, chart: &mut Chart, way: Direction, is_drift: bool, before: f64) {
+        self.open = Some(chart.excursions.len());
+        chart
+            .excursions
+            .extend(chart.nights.last().map(|last| Excursion {
+                way,
+                is_drift,
+                raised: last.night,
+                ended: None,
+                change: self.locate(&chart.nights, way, is_drift),
+                before,
+                after: f64::NAN,
+            }));
+    }
+
+    /// When the change towards `way` began that lasts until the newest night.
+    fn locate(&self, nights: &[ChartPoint], way: Direction, is_drift: bool) -> ChangeWindow {
+        let nights = &nights[self.from..];
+        let mut change = change::locate(nights, way);
+        if let Some(first) = nights.get(MIN_NIGHTS).filter(|_| is_drift) {
+            change.nights[0] = first.night;
+        }
+        change
+    }
+
+    /// Adds a value to the reference once it has waited long enough and no excursion is open. Returns whether the reference changed.
+    fn learn(&mut self, sample: Sample) -> bool {
         if self.learned.len() < MIN_NIGHTS {
             self.learned.push(sample);
-        } else if self.learned.len() < MAX_NIGHTS && self.open.is_none() {
+        } else if self.learned.len() < MAX_NIGHTS && self.open.is_none() && !self.is_frozen {
             self.waiting.push(sample);
             if self.waiting.len() <= REFERENCE_DELAY {
-                return;
+                return false;
             }
             self.learned.push(self.waiting.remove(0));
         } else {
-            return;
+            return false;
         }
         self.reference = Reference::of(&self.learned, self.is_count);
+        true
+    }
+
+    /// Keeps only the first nights of a reference that drifted, scores the nights after them against it, and opens an excursion.
+    fn freeze(&mut self, chart: &mut Chart, way: Direction) {
+        self.learned.truncate(MIN_NIGHTS);
+        self.waiting.clear();
+        self.is_frozen = true;
+        self.reference = Reference::of(&self.learned, self.is_count);
+        let Some(reference) = self.reference else {
+            return;
+        };
+        self.scores.clear();
+        for night in chart.nights[self.from..].iter_mut().skip(MIN_NIGHTS) {
+            let score = reference.score(night.value);
+            night.score = Some(score);
+            self.scores.push(score);
+        }
+        self.open(chart, way, true, reference.centre);
     }
 
     /// Closes the open excursion.
@@ -273,8 +318,8 @@ impl ChartBuilder {
     /// Re-estimates the open excursion from all nights.
     fn finish(&self, chart: &mut Chart) {
         if let Some(at) = self.open {
-            chart.excursions[at].change =
-                change::locate(&chart.nights[self.from..], chart.excursions[at].way);
+            let Excursion { way, is_drift, .. } = chart.excursions[at];
+            chart.excursions[at].change = self.locate(&chart.nights, way, is_drift);
             set_level_after(chart, at);
         }
     }

@@ -9,6 +9,7 @@ pub mod cause;
 pub mod change;
 pub mod chart;
 pub mod derived;
+mod drift;
 pub mod history;
 pub mod reference;
 pub mod report;

@@ -182,6 +182,8 @@ pub(crate) struct PlantedChange {
     pub from: usize,
     /// Factor on their values.
     pub factor: f64,
+    /// Growth of the factor with every further night.
+    pub growth: f64,
 }
 
 /// Draws the nights of a bench in order.
@@ -264,7 +266,7 @@ impl Bench {
             let mut value = metric.draw(random, *temperature);
             let hits = |p: &&PlantedChange| metric.name.starts_with(p.series) && at >= p.from;
             for p in planted.iter().filter(hits) {
-                value *= p.factor;
+                value *= p.factor + p.growth * (at - p.from) as f64;
             }
             // The lamps were off: the values are meaningless.
             let is_wrong = invalid && metric.name.starts_with("golden");
