@@ -39,6 +39,8 @@ pub enum ParameterKind {
     Count,
     /// A day, `2026-11-20`, from its beginning in UTC.
     Day,
+    /// One of these words.
+    Choice(&'static [&'static str]),
 }
 
 /// Answer to a question.
@@ -57,17 +59,19 @@ pub struct Answer {
 impl ParameterKind {
     /// Description of a valid value.
     #[must_use]
-    pub const fn words(self) -> &'static str {
+    pub fn words(self) -> String {
         match self {
-            Self::Text => "text",
-            Self::Count => "a count from 1",
-            Self::Day => "a day, for example 2026-11-20",
+            Self::Text => "text".to_owned(),
+            Self::Count => "a count from 1".to_owned(),
+            Self::Day => "a day, for example 2026-11-20".to_owned(),
+            Self::Choice(words) => format!("one of {}", words.join(", ")),
         }
     }
 
     fn read(self, text: &str) -> Option<Bound> {
         match self {
             Self::Text => Some(text.into()),
+            Self::Choice(words) => words.contains(&text).then(|| text.into()),
             Self::Count => text
                 .parse::<i64>()
                 .ok()
@@ -113,7 +117,21 @@ impl Question {
                 bound.ok_or_else(|| wrong(format!("{name} as {kind}"), format!("`{text}`")))?;
             Ok((name, text.to_owned(), bound))
         };
-        self.parameters.iter().map(value).collect()
+        let bound: Vec<_> = self
+            .parameters
+            .iter()
+            .map(value)
+            .collect::<Result<_, _>>()?;
+        let day = |wanted: &str| bound.iter().find(|(name, ..)| *name == wanted);
+        if let (Some((_, since, from)), Some((_, until, to))) = (day("since"), day("until"))
+            && from.integer() > to.integer()
+        {
+            return Err(wrong(
+                "since before until".to_owned(),
+                format!("{since} and {until}"),
+            ));
+        }
+        Ok(bound)
     }
 }
 

@@ -21,9 +21,21 @@ const fn optional(name: &'static str, kind: ParameterKind, default: &'static str
 const PROTOTYPE: Parameter = required("prototype");
 const MIN_SESSIONS: Parameter = optional("min_sessions", ParameterKind::Count, "3");
 const ANALYSIS: Parameter = optional("analysis", ParameterKind::Text, "official");
-const CAMERA: Parameter = optional("camera", ParameterKind::Text, "camera1");
-const ROLE: Parameter = optional("role", ParameterKind::Text, "camera1");
-const RELATION: Parameter = optional("relation", ParameterKind::Text, "repaired");
+const CAMERA: Parameter = optional(
+    "camera",
+    ParameterKind::Choice(&["camera1", "camera2"]),
+    "camera1",
+);
+const ROLE: Parameter = optional(
+    "role",
+    ParameterKind::Choice(&["indenter", "camera1", "camera2", "trigger_box"]),
+    "camera1",
+);
+const RELATION: Parameter = optional(
+    "relation",
+    ParameterKind::Choice(&["molded_from", "repaired", "recut"]),
+    "repaired",
+);
 const SINCE: Parameter = optional("since", ParameterKind::Day, "1970-01-01");
 const UNTIL: Parameter = optional("until", ParameterKind::Day, "9999-12-31");
 const LIMIT: Parameter = optional("limit", ParameterKind::Count, "50");

@@ -45,6 +45,14 @@ pub(crate) enum Bound {
 }
 
 impl Bound {
+    /// The number, if it is whole.
+    pub(crate) const fn integer(&self) -> Option<i64> {
+        match self {
+            Self::Integer(n) => *n,
+            Self::Real(_) | Self::Text(_) => None,
+        }
+    }
+
     /// A missing value of the same type.
     pub(crate) const fn missing(&self) -> Self {
         match self {

@@ -27,14 +27,21 @@ enum Added {
 /// Adds each session that is not there yet, and writes damaged ones again.
 ///
 /// # Errors
-/// [`Failure::limit`] if a session is not sealed or INVALID, after all others; [`Failure::input`] for one that cannot be read, or
-/// that the lake has with another content; [`Failure::internal`] when a file cannot be written.
+/// After all others: [`Failure::limit`] if a session is not sealed or INVALID; [`Failure::input`] for one that cannot be read, or that
+/// the lake has with another content; [`Failure::internal`] when a file cannot be written.
 pub(crate) fn lake(args: &LakeArgs, json: bool) -> Outcome {
     let lake = Lake::new(&args.to);
     let mut rows = Vec::new();
     let (mut added, mut mended, mut there, mut left_out) = (0, 0, 0, 0);
+    let mut failed: Option<Failure> = None;
     for path in files(&args.sessions)? {
-        let (state, why) = match add(&lake, &path)? {
+        // One session that fails does not keep the others out.
+        let outcome = add(&lake, &path).unwrap_or_else(|failure| {
+            let why = failure.message.trim_start_matches("error: ").to_owned();
+            failed.get_or_insert(failure);
+            Added::LeftOut(why)
+        });
+        let (state, why) = match outcome {
             Added::Now => {
                 added += 1;
                 ("added", None)
@@ -72,10 +79,17 @@ pub(crate) fn lake(args: &LakeArgs, json: bool) -> Outcome {
     if left_out == 0 {
         return Ok(Exit::Ok);
     }
-    Err(Failure::limit(format!(
+    let summary = format!(
         "{}: {left_out} sessions left out\n  next: `skinrig resume` seals a session; `skinrig report` explains an INVALID one",
         args.to.display()
-    )))
+    );
+    Err(match failed {
+        Some(failed) => Failure {
+            message: format!("error: {summary}"),
+            ..failed
+        },
+        None => Failure::limit(summary),
+    })
 }
 
 /// The sessions of the arguments, those of a folder by name.

@@ -34,7 +34,7 @@ struct Point {
     overrides: Vec<String>,
 }
 
-/// Comparable sessions: one prototype, one protocol, one kind of rig.
+/// Comparable sessions: one prototype, one protocol, one kind of rig, one set of changes of a variant.
 #[derive(Debug, Serialize)]
 struct Series {
     protocol: String,
@@ -124,6 +124,7 @@ fn read(shelf: &Shelf, analysis: Option<&str>) -> Vec<Entry> {
             protocol_name,
             rig_kind,
             annotations,
+            sealed,
             ..
         } = &session.state
         else {
@@ -131,6 +132,8 @@ fn read(shelf: &Shelf, analysis: Option<&str>) -> Vec<Entry> {
         };
         let found = shelf.result(&session.path, session_id, analysis);
         let (rmse_mm, without) = match &found {
+            // As for `compare`: nothing shows that its rows are those that were recorded.
+            Ok(_) if !sealed => (None, Some("not sealed".to_owned())),
             Ok(found) => usable(found.is_valid, found.rmse_mm),
             Err(why) => (None, Some(why.to_string())),
         };
@@ -159,16 +162,17 @@ fn read(shelf: &Shelf, analysis: Option<&str>) -> Vec<Entry> {
 
 /// Groups sessions by prototype, then by protocol and kind of rig; keeps their order.
 fn group(entries: Vec<Entry>) -> Vec<Prototype> {
-    type Groups = BTreeMap<(String, String), Vec<Point>>;
+    type Groups = BTreeMap<(String, String, String), Vec<Point>>;
     let mut all: BTreeMap<String, (usize, String, Groups)> = BTreeMap::new();
     for entry in entries {
         let (count, last, groups) = all.entry(entry.prototype).or_default();
         *count += 1;
         last.clone_from(&entry.point.started_at);
-        let key = (entry.protocol, entry.rig_kind);
+        let changed = entry.point.variant.as_ref().and_then(Variant::changes);
+        let key = (entry.protocol, entry.rig_kind, changed.unwrap_or_default());
         groups.entry(key).or_default().push(entry.point);
     }
-    let series = |((protocol, rig_kind), points): ((String, String), Vec<Point>)| {
+    let series = |((protocol, rig_kind, _), points): ((String, String, String), Vec<Point>)| {
         let usable = || points.iter().filter_map(|p| p.rmse_mm);
         let value = |e: &Estimate| e.value.unwrap_or(f64::INFINITY);
         Series {

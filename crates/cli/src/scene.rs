@@ -4,6 +4,7 @@ use std::path::Path;
 
 use skinrig_analysis::event_statistics::{EventStatistics, EventStatisticsCollector};
 use skinrig_analysis::{Analysis, EventSource};
+use skinrig_formats::StreamStats;
 use skinrig_formats::inspect::FileKind;
 use skinrig_formats::raw::RawReader;
 use skinrig_model::CameraId;
@@ -45,6 +46,7 @@ fn check(args: &SceneCheckArgs, json: bool) -> Outcome {
         let rows = recordings.iter().map(|r| {
             serde_json::json!({
                 "recording": r.name, "origin": r.origin, "cameras": r.cameras, "without_presses": r.without_presses,
+                "broken_stream": r.broken_stream,
             })
         });
         let rows: Vec<_> = rows.collect();
@@ -83,13 +85,38 @@ fn of_raw(path: &Path) -> Result<Recording, Failure> {
         }
         decoder.for_each_slice(bytes, |events| collector.push(events));
     }
+    let stats = decoder.stats();
+    let events = stats.cd_events();
+    let not_events = stats.skipped_words() + stats.dropped_before_address + stats.out_of_geometry;
+    if not_events > events {
+        return Err(Failure::input(format!(
+            "{}: expected a stream of events, found {not_events} words that are none, and {events} events\n  next: `skinrig inspect` \
+             counts what the file holds; the recording program states its format and the size of the sensor",
+            path.display()
+        )));
+    }
     Ok(Recording {
         name: path.display().to_string(),
         origin: "RAW file".to_owned(),
         is_stand_in: false,
         without_presses: None,
+        broken_stream: broken_stream(&stats),
         cameras: vec![collector.finish(CameraId::One)],
     })
+}
+
+/// What of a stream is not in its statistics, or spoils their times.
+fn broken_stream(stats: &StreamStats) -> Option<String> {
+    let found = [
+        (stats.skipped_words(), "words without a meaning"),
+        (stats.dropped_before_address, "events without an address"),
+        (stats.out_of_geometry, "events outside the sensor"),
+        (stats.discontinuities, "jumps of the time base"),
+        (stats.trailing_bytes, "bytes of an unfinished word"),
+    ];
+    let found = found.iter().filter(|(n, _)| *n > 0);
+    let found: Vec<String> = found.map(|(n, what)| format!("{what} ({n})")).collect();
+    (!found.is_empty()).then(|| found.join(", "))
 }
 
 fn of_session(path: &Path) -> Result<Recording, Failure> {
@@ -117,6 +144,7 @@ fn of_session(path: &Path) -> Result<Recording, Failure> {
         },
         is_stand_in: matches!(origin, Some(Origin::Simulated | Origin::Emulated)),
         without_presses,
+        broken_stream: None,
         cameras: vec![one.map_err(failed)?, two.map_err(failed)?],
     })
 }

@@ -132,12 +132,16 @@ pub(crate) fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf
     )))
 }
 
-/// The representative of several copies of one session: sealed before unsealed (`salvage` never seals), then the shorter path
-/// before the longer.
+/// The representative of several copies of one session: one whose rows are those that were sealed before a changed one, sealed
+/// before unsealed (`salvage` never seals), then the shorter path before the longer.
 fn representative<'a>(copies: &[&'a SessionSummary]) -> Option<&'a SessionSummary> {
+    if let [only] = copies {
+        return Some(only);
+    }
     let rank = |s: &&&SessionSummary| {
         let sealed = matches!(s.state, SessionState::Readable { sealed: true, .. });
-        (!sealed, s.path.as_os_str().len(), s.path.clone())
+        let changed = SessionReader::open_checked(&s.path).is_err();
+        (changed, !sealed, s.path.as_os_str().len(), s.path.clone())
     };
     copies.iter().min_by_key(rank).copied()
 }
@@ -174,10 +178,16 @@ pub(crate) fn copies(all: &[SessionSummary]) -> Vec<String> {
             continue;
         };
         for copy in copies.iter().filter(|s| s.path != chosen.path) {
+            let changed = SessionReader::open_checked(&copy.path).err();
             let (copy, chosen) = (copy.path.display(), chosen.path.display());
-            notes.push(format!(
-                "{copy} is a copy of the session {chosen}; it is not counted again"
-            ));
+            notes.push(match changed {
+                Some(changed) => {
+                    format!("not counted, a copy of {chosen} that was changed: {changed}")
+                }
+                None => {
+                    format!("{copy} is a copy of the session {chosen}; it is not counted again")
+                }
+            });
         }
     }
     notes

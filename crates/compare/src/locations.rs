@@ -1,22 +1,11 @@
 //! Owns matching of locations between skins by planned position, and which presses count.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use skinrig_analysis::result::PressResult;
-use skinrig_model::{Point2, PressRole, Verdict};
+use skinrig_model::{Places, Point2, PressRole, Verdict};
 
 use crate::subject::{Session, Subject};
-
-/// Largest distance between planned positions of the same location, mm.
-const SAME_LOCATION_MM: f64 = 0.05;
-
-/// Planned position, quantised to [`SAME_LOCATION_MM`].
-type Cell = (i64, i64);
-
-fn cell(at: Point2) -> Cell {
-    let of = |mm: f64| (mm / SAME_LOCATION_MM).round() as i64;
-    (of(at.x_mm), of(at.y_mm))
-}
 
 /// Depth in µm.
 fn micrometres(depth_mm: f64) -> i64 {
@@ -26,8 +15,7 @@ fn micrometres(depth_mm: f64) -> i64 {
 /// Locations of several skins, with common numbers.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Locations {
-    numbers: BTreeMap<Cell, u32>,
-    at: Vec<Point2>,
+    places: Places,
     /// Depths shared by all skins, µm.
     depths: BTreeSet<i64>,
 }
@@ -62,10 +50,7 @@ impl Locations {
     pub(crate) fn of(subjects: &[Subject]) -> Self {
         let mut locations = Self::default();
         for press in subjects.iter().flat_map(scored) {
-            let next = locations.at.len() as u32;
-            if *locations.numbers.entry(cell(press.planned)).or_insert(next) == next {
-                locations.at.push(press.planned);
-            }
+            locations.places.add(press.planned);
         }
         let depths =
             |s: &Subject| -> BTreeSet<i64> { scored(s).map(|p| micrometres(p.depth_mm)).collect() };
@@ -80,12 +65,12 @@ impl Locations {
 
     /// Planned position of a location.
     pub(crate) fn at(&self, location: u32) -> Point2 {
-        self.at[location as usize]
+        self.places.all()[location as usize]
     }
 
     /// Number of locations.
     pub(crate) fn len(&self) -> usize {
-        self.at.len()
+        self.places.all().len()
     }
 
     /// Number of depths that all skins share.
@@ -112,7 +97,7 @@ impl Locations {
                 let presses = session.analysis.presses.iter().filter(|p| is_attempt(p));
                 presses.filter_map(move |press| {
                     Some(Attempt {
-                        location: *self.numbers.get(&cell(press.planned))?,
+                        location: self.places.find(press.planned)?,
                         series: (i * depths + depth(press)?) as u32,
                         press,
                         session,

@@ -318,6 +318,11 @@ pub fn verify_crate(folder: &Path) -> Result<CrateReport, ExportError> {
             problems.push(Problem::new(name, "a file", "none"));
             continue;
         }
+        if is_linked(folder, name)? {
+            let expected = "a file of the crate itself";
+            problems.push(Problem::new(name, expected, "a symbolic link"));
+            continue;
+        }
         let found = entry(folder, name)?;
         if found.bytes.to_string() != *bytes {
             problems.push(Problem::new(
@@ -365,6 +370,13 @@ fn files_in(folder: &Path) -> Result<Vec<String>, ExportError> {
     }
     found.sort();
     Ok(found)
+}
+
+/// Whether a described file is a link: a copy of the crate may not have what it leads to.
+fn is_linked(folder: &Path, name: &str) -> Result<bool, ExportError> {
+    let path = folder.join(name);
+    let found = std::fs::symlink_metadata(&path).map_err(ExportError::file(&path))?;
+    Ok(found.is_symlink())
 }
 
 /// True for a path that stays in the folder.

@@ -15,6 +15,7 @@ pub mod level_bias;
 pub mod limit;
 pub mod notification;
 mod number;
+mod places;
 pub mod pose;
 pub mod preflight;
 pub mod press;
@@ -52,6 +53,7 @@ pub use id::{AttemptId, CameraId, LocationId, PressId, RepetitionId, as_index};
 pub use lens::{LensAngle, LensKind, LensModel};
 pub use limit::{Limit, Side};
 pub use notification::{Notification, NotificationChannel, Occasion};
+pub use places::{Places, SAME_PLACE_MM, merge_places};
 pub use pose::PoseSample;
 pub use preflight::{CheckKind, CheckVerdict, PreflightCheck};
 pub use press::{

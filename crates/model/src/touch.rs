@@ -81,6 +81,15 @@ pub enum Reaction {
 }
 
 impl Reaction {
+    /// What a press does, as a verb.
+    #[must_use]
+    pub const fn verb(self) -> &'static str {
+        match self {
+            Self::Stop => "stop",
+            Self::Lift => "lift",
+        }
+    }
+
     /// Its record.
     #[must_use]
     pub const fn kind(self) -> TouchKind {

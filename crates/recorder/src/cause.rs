@@ -33,6 +33,20 @@ pub(crate) fn cause_from<T: DeserializeOwned>(
         .map_err(|e| Fault::bad(column, "a cause of a kind that this version has", e))
 }
 
+/// Refuses a row that states why it is not what it says.
+fn without_cause(
+    row: &SqliteRow,
+    columns: [&'static str; 2],
+    expected: &'static str,
+) -> Result<(), Fault> {
+    for column in columns {
+        if let Some(found) = text_if_present(row, column)? {
+            return Err(Fault::bad(column, expected, format!("`{found}`")));
+        }
+    }
+    Ok(())
+}
+
 /// Verdict on an attempt; `None` while it is open.
 pub(crate) fn verdict_from(
     row: &SqliteRow,
@@ -42,7 +56,10 @@ pub(crate) fn verdict_from(
     let recorded = || opt_text(row, "reason").map(Option::unwrap_or_default);
     Ok(Some(match opt_text(row, "verdict")?.as_deref() {
         None => return Ok(None),
-        Some("valid") => PressVerdict::Valid,
+        Some("valid") => {
+            without_cause(row, ["reason", CAUSE], "no cause of a valid attempt")?;
+            PressVerdict::Valid
+        }
         Some("missed") => PressVerdict::Missed(match cause_from(row, CAUSE)? {
             Some(reason) => reason,
             None => legacy_text::missed(recorded()?),
@@ -70,7 +87,11 @@ pub(crate) struct EndColumns {
 pub(crate) fn end_from(row: &SqliteRow, columns: &EndColumns) -> Result<RunEnd, Fault> {
     let recorded = || opt_text(row, columns.reason).map(Option::unwrap_or_default);
     Ok(match text(row, columns.status)?.as_str() {
-        "completed" => RunEnd::Completed,
+        "completed" => {
+            let columns = [columns.reason, columns.cause];
+            without_cause(row, columns, "no cause of the end of a completed run")?;
+            RunEnd::Completed
+        }
         "stopped" => RunEnd::Stopped(match cause_from(row, columns.cause)? {
             Some(reason) => reason,
             None => legacy_text::stopped(recorded()?),

@@ -6,7 +6,7 @@ use std::thread::ScopedJoinHandle;
 use sha2::{Digest, Sha256};
 use skinrig_model::{
     BoxReport, BoxTime, CameraId, ChunkFacts, HostTime, PlannedPress, PressId, PressVerdict,
-    RunHeader, StreamFormat, TriggerEdge, press::PressRole,
+    RunEnd, RunHeader, StreamFormat, TriggerEdge, press::PressRole,
 };
 
 mod chain;
@@ -254,7 +254,8 @@ fn check_plan(header: &RunHeader, report: &mut VerifyReport) {
 
 /// Checks the journal: phase times in order, consecutive attempt numbers, no open attempt after the run has ended.
 fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
-    let ended = report.ok_or_add(reader.end()).flatten().is_some();
+    let end = report.ok_or_add(reader.end()).flatten().map(|(_, end)| end);
+    let (ended, completed) = (end.is_some(), end == Some(RunEnd::Completed));
     // Another check reports a missing header, and with it missing legs.
     let legs = reader.legs().unwrap_or_default();
     let leg_of = |attempt: &AttemptRow| {
@@ -304,6 +305,14 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
                     report.mismatch(attempt.id, "phase times in order", "them out of order");
                 }
             }
+        }
+        let last = attempts.last().and_then(|a| a.outcome.as_ref());
+        if completed && last.is_some_and(|o| matches!(o.verdict, PressVerdict::Missed(_))) {
+            report.mismatch(
+                planned.id,
+                "an attempt in a completed run",
+                "a missed press",
+            );
         }
         if ended && attempts.last().is_none_or(|a| a.outcome.is_none()) {
             report.mismatch(planned.id, "a verdict in an ended run", "none");

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use skinrig_analysis::{EarlierAttempt, LegStart, SessionInput};
 use skinrig_model::{
     AnalysisSettings, AttemptId, CameraId, RigGeometry, RunHeader, TouchKind, TriggerEdge,
+    merge_places,
 };
 use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 
@@ -70,6 +71,7 @@ impl Session {
             outcomes.push(attempts.pop().and_then(|last| last.outcome));
             earlier.extend(attempts.iter().filter_map(earlier_attempt));
         }
+        merge_places(&mut planned);
         let (pose_interval_us, crossing_se_us) = contacts::timing(reader, &outcomes)?;
         let descents = contacts::descents(reader, &outcomes)?;
         let hold_forces_n = contacts::hold_forces(reader, &planned, &outcomes)?;

@@ -1,6 +1,6 @@
 //! The stages from an open session to its analysis; each one returns its own value.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use skinrig_analysis::motion::MotionCourse;
@@ -9,7 +9,10 @@ use skinrig_analysis::result::{Motion, PressResult, Warning, WarningCause};
 use skinrig_analysis::{
     Analysis, LegStart, Retention, SessionInput, analyze_recalibrated, analyze_with_events, legs,
 };
-use skinrig_model::{HostTime, PressId, PressOutcome, Reaction};
+use skinrig_model::{
+    AttemptId, HostTime, PressId, PressOutcome, PressRole, Reaction, TouchEstimate, Verdict,
+};
+use skinrig_protocol::Online;
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::campaign;
@@ -118,6 +121,11 @@ impl AlignedSession {
         if self.session.reader.seal()?.is_none() {
             analysis.warnings.insert(0, WarningCause::NotSealed.into());
         }
+        let without = wanted_reaction(plan_json).and_then(|wanted| {
+            let attempt = |p: &PressResult| outcomes.get(&p.press).map(|o| o.attempt);
+            without_reaction(&analysis, &touches, wanted, attempt)
+        });
+        analysis.warnings.extend(without.map(Warning::from));
         let reactions = felt.as_ref().and_then(|f| f.reactions.as_ref());
         let stops = reactions.filter(|r| r.reaction == Reaction::Stop);
         analysis.warnings.extend(stops.and_then(|r| {
@@ -149,6 +157,36 @@ pub fn analyze(path: &Path, options: AnalysisOptions<'_>) -> Result<AnalyzedSess
         .read_input()?
         .align()
         .analyze()
+}
+
+/// What scored presses of a plan do when they are felt; `None` if they go on.
+fn wanted_reaction(plan_json: &str) -> Option<Reaction> {
+    #[derive(serde::Deserialize)]
+    struct Part {
+        online: Option<Online>,
+    }
+    let part: Part = serde_json::from_str(plan_json).ok()?;
+    Some(part.online?.react?.then)
+}
+
+/// The valid scored presses that did not do what they should when they are felt; `None` if all did. `attempt` gives the one that counts.
+fn without_reaction(
+    analysis: &Analysis,
+    touches: &[TouchEstimate],
+    wanted: Reaction,
+    attempt: impl Fn(&PressResult) -> Option<AttemptId>,
+) -> Option<WarningCause> {
+    let own = touches.iter().filter(|t| t.kind == wanted.kind());
+    let reactions: BTreeSet<AttemptId> = own.filter_map(|t| t.attempt).collect();
+    let counts = |p: &&PressResult| p.role == PressRole::Score && p.verdict == Verdict::Valid;
+    let scored = || analysis.presses.iter().filter(counts);
+    let reacted = scored().filter(|p| attempt(p).is_some_and(|a| reactions.contains(&a)));
+    let (reacted, presses) = (reacted.count() as u32, scored().count() as u32);
+    (reacted < presses).then_some(WarningCause::WithoutReaction {
+        wanted,
+        reacted,
+        presses,
+    })
 }
 
 /// The robot's path compared with its commands, in full around the presses with a rate close-up.

@@ -81,7 +81,7 @@ use crate::rule::Rule;
 /// positions have at least nine correct digits where the problem is well posed. Version 14: so have held-out errors; the
 /// estimated depth treats ON and OFF alike, and intervals are wider for few locations. Version 16: a depth that presses stopped short of has no
 /// errors of its own.
-pub const ANALYSIS_VERSION: u32 = 18;
+pub const ANALYSIS_VERSION: u32 = 19;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -343,6 +343,11 @@ fn of_results() -> Vec<(Value, &'static str)> {
              25.00 mm); check for swapped cameras, a wrong unit or a shifted order of presses",
         ),
         (
+            json!({"kind": "without_reaction", "wanted": "stop", "reacted": 11, "presses": 27}),
+            "the protocol asks presses to stop when they are felt: 11 of 27 valid scored presses did, and the numbers are of \
+             all; the run's notes (`skinrig show`) may say why",
+        ),
+        (
             json!({"kind": "locator_unfit", "wanted": "direct",
                 "why": {"kind": "line",
                     "text": "the calibration locations lie on a line or a curve; spread them over the skin"}}),

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{CalibrationModel, CameraId, Locator, PressId};
+use skinrig_model::{CalibrationModel, CameraId, Locator, PressId, Reaction};
 
 use super::Estimate;
 use crate::clock::{MarksError, RatesError};
@@ -59,6 +59,22 @@ impl fmt::Display for Warning {
             (None, None) => {}
         }
         self.cause.fmt(f)
+    }
+}
+
+impl WarningCause {
+    /// Whether something else was done or counted than was asked for, which concerns every number.
+    #[must_use]
+    pub const fn is_grave(&self) -> bool {
+        matches!(
+            self,
+            Self::NotSealed
+                | Self::WithoutReaction { .. }
+                | Self::WindowsOverlap
+                | Self::LocatorUnfit { .. }
+                | Self::FewLocationsForModel { .. }
+                | Self::ImplausibleModel { .. }
+        )
     }
 }
 
@@ -434,6 +450,20 @@ pub enum WarningCause {
         presses: Vec<PressId>,
         /// Presses that correct.
         of: u32,
+    },
+    /// The protocol asks for reactions, and presses had none.
+    #[error(
+        "the protocol asks presses to {} when they are felt: {reacted} of {presses} valid scored presses did, and the numbers are of \
+         all; the run's notes (`skinrig show`) may say why",
+        .wanted.verb()
+    )]
+    WithoutReaction {
+        /// In the protocol.
+        wanted: Reaction,
+        /// Valid scored presses that reacted,
+        reacted: u32,
+        /// and all.
+        presses: u32,
     },
     /// The locator in the settings cannot learn.
     #[error("the locator `{}` cannot learn: {why}; using `geometry`", .wanted.name())]

@@ -97,9 +97,14 @@ fn answers_are_those_of_the_entries() {
     let sessions = fill(&mut catalogue, &lab, 300, 20);
     let mut ask = |name, given: &[(&str, &str)]| ask(&mut catalogue, name, given);
 
-    // Prototypes with three sessions and more, by mean RMSE.
+    // Prototypes with three sealed sessions and more, by mean RMSE.
     let mut groups: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
-    for s in &sessions {
+    assert!(
+        sessions
+            .iter()
+            .any(|s| s.content_sha256.is_none() && rmse(s).is_some())
+    );
+    for s in sessions.iter().filter(|s| s.content_sha256.is_some()) {
         let key = (s.headline.prototype.as_str(), s.headline.rig_kind.as_str());
         groups.entry(key).or_default().extend(rmse(s));
     }
@@ -256,6 +261,12 @@ fn wrong_parameters_are_rejected() {
         ("tagged", &[("tag", "a"), ("tags", "b")], "among tag, limit"),
         ("rigs", &[("since", "2025-02-30")], "a day"),
         ("tags", &[("tag", "a")], "no parameters"),
+        ("clock-drift", &[("camera", "camera3")], "camera1, camera2"),
+        (
+            "rigs",
+            &[("since", "2026-02-01"), ("until", "2026-01-01")],
+            "since before until",
+        ),
     ] {
         let error = ask(name, given).unwrap_err();
         assert!(matches!(error, CatalogueError::Parameter { .. }));

@@ -40,19 +40,24 @@ pub struct DetectArgs {
     pub detect: Option<f64>,
 
     /// The session from which the variance is estimated.
-    #[arg(long, value_name = "SESSION", requires = "detect")]
+    #[arg(
+        long,
+        value_name = "SESSION",
+        requires = "detect",
+        conflicts_with = "protocol"
+    )]
     pub from: Option<PathBuf>,
 
     /// Power: probability of detecting the difference.
-    #[arg(long, value_name = "SHARE", default_value = "0.8", value_parser = probability)]
+    #[arg(long, value_name = "SHARE", default_value = "0.8", value_parser = probability, requires = "detect", conflicts_with = "protocol")]
     pub power: f64,
 
     /// Significance level: probability of claiming a difference when there is none.
-    #[arg(long, value_name = "SHARE", default_value = "0.05", value_parser = probability)]
+    #[arg(long, value_name = "SHARE", default_value = "0.05", value_parser = probability, requires = "detect", conflicts_with = "protocol")]
     pub alpha: f64,
 
     /// Share of the between-location variance that the two skins have in common, from 0 (unknown) to 1.
-    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = share, requires = "detect", conflicts_with = "protocol")]
     pub common: f64,
 }
 

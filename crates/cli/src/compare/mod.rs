@@ -176,12 +176,16 @@ fn refusal(result: &Comparison, args: &CompareArgs) -> Option<String> {
                 .next
                 .as_deref()
                 .unwrap_or("see docs/reference/comparison.md");
+            let despite = if d.is_final {
+                String::new()
+            } else {
+                format!(", or override it with --despite {}", d.key)
+            };
             format!(
-                "{}: {} ({})\n  next: {next}, or override it with --despite {}",
+                "{}: {} ({})\n  next: {next}{despite}",
                 d.what,
                 d.reason,
-                values.join(", "),
-                d.key
+                values.join(", ")
             )
         })
         .collect();

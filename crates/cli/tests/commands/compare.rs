@@ -304,7 +304,16 @@ fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
         refused.out.contains("BLOCKING") && !refused.out.contains("RMSE"),
         "{refused:?}"
     );
-    refused.expect_stderr(&["depths", "no depth is shared", "--despite depths"]);
+    let refused = refused.expect_stderr(&[
+        "depths",
+        "no depth is shared",
+        "press both skins to the same",
+    ]);
+    // Nothing would be left to compare.
+    assert!(!refused.err.contains("--despite"), "{refused:?}");
+    skinrig(&["compare", &a, &deeper, "--despite", "depths"])
+        .code(2)
+        .expect_stderr(&["depths", "no depth is shared"]);
     assert!(
         files(&lab.path("a"), ".html").is_empty(),
         "a page of what may not be compared"

@@ -19,6 +19,20 @@ fn faults(spoil: impl FnOnce(&mut Dataset)) -> (Vec<String>, String) {
     (names.collect(), output.out)
 }
 
+/// A place that a path lists again is the same location: its presses are not independent.
+#[test]
+fn a_place_that_is_listed_again_is_one_location() {
+    let lab = Lab::new();
+    let points =
+        "path={points: [[10 mm, 2 mm], [-10 mm, 18 mm], [10 mm, 2.01 mm], [-10 mm, 18 mm]]}";
+    let session = text(&lab.record("s", &["--set", points]));
+    let results = skinrig(&["--json", "analyze", &session]).code(0).json();
+    let presses = results["analysis"]["presses"].as_array().unwrap();
+    let scored = presses.iter().filter(|p| p["role"] == "score");
+    let locations: Vec<u64> = scored.map(|p| p["location"].as_u64().unwrap()).collect();
+    assert_eq!(locations, [1, 2, 1, 2, 1, 2, 1, 2]);
+}
+
 fn write_positions(data: &Dataset, change: impl Fn(usize, Point2) -> Point2) {
     let moved: Vec<Point2> = positions()
         .into_iter()

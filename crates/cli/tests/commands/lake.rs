@@ -150,4 +150,18 @@ fn a_session_that_may_not_be_used_is_left_out_loudly() {
         .code(4)
         .expect_stderr(&["left out: it is not sealed", "skinrig resume"]);
     assert!(added.out.contains("1 sessions added"), "{added:#?}");
+
+    // One that cannot be read, or whose folder no file system can name, does not keep the others out.
+    let broken = lab.text("broken.session.sqlite");
+    std::fs::write(&broken, "no session").unwrap();
+    let name = format!("prototype.id={}", "x".repeat(300));
+    let long = text(&lab.record("long", &["--set", &name]));
+    let lake = lab.text("another");
+    let all = ["lake", &broken, &long, &good, "--to", &lake];
+    let added = skinrig(&all).code(2).expect_stderr(&[
+        "broken.session.sqlite: left out",
+        "File name too long",
+        "2 sessions left out",
+    ]);
+    assert!(added.out.contains("1 sessions added"), "{added:#?}");
 }

@@ -207,6 +207,24 @@ fn another_program_follows_what_is_felt() {
         .expect_stderr(&["expected a run that writes this session", "skinrig show"]);
 }
 
+/// A reaction that cannot happen is said beside the answer.
+#[test]
+fn presses_that_do_not_react_are_named_beside_the_answer() {
+    let lab = Lab::new();
+    let session = session_with(
+        &lab,
+        &["--set", "online.react={then: stop, region: 1e-9 mm}"],
+    );
+    let output = skinrig(&["analyze", &session]).code(0);
+    let text = "asks presses to stop when they are felt: 0 of 4 valid scored presses did";
+    let lines: Vec<&str> = output.out.lines().map(str::trim).collect();
+    assert!(lines.join(" ").contains(text), "{output:?}");
+    let lab = Lab::new();
+    let session = session_with(&lab, &["--set", "online.false_alarms=0.1 Hz"]);
+    let output = skinrig(&["analyze", &session, "-v"]).code(0);
+    assert!(!output.out.contains("asks presses"), "{output:?}");
+}
+
 /// The leg that resumes a session does not feel: its presses are not missed.
 #[test]
 fn presses_after_a_resume_are_not_missed() {

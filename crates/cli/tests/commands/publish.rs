@@ -153,8 +153,13 @@ fn a_published_selection_is_derived_again_elsewhere_and_any_edit_fails() {
     forge(&folder, &table, ",valid,", ",missed,");
     std::fs::write(folder.join("more"), "x").unwrap();
     std::fs::remove_file(only(&bundle, ".camera1.raw")).unwrap();
+    // A link to the same bytes is no file of the crate.
+    let about = folder.join("publication.yaml");
+    std::fs::rename(&about, lab.path("elsewhere.yaml")).unwrap();
+    std::os::unix::fs::symlink(lab.path("elsewhere.yaml"), &about).unwrap();
     let failed = reproduce(&folder).code(4).out;
     for part in [
+        "publication.yaml: expected a file of the crate itself, found a symbolic link",
         ".presses.csv: expected",
         "FAIL  more: expected",
         ".camera1.raw: expected a file, found none",

@@ -55,6 +55,36 @@ fn too_many_and_other_files_are_refused() {
             "expected a session or a Prophesee RAW file",
             "next: `skinrig import`",
         ]);
+    // Bytes that are no events.
+    let raw = lab.path("noise.raw");
+    let mut bytes = b"% evt 2.0\n% end\n".to_vec();
+    let mut state = 1u64;
+    for _ in 0..100_000 {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        bytes.extend(((state >> 32) as u32).to_le_bytes());
+    }
+    std::fs::write(&raw, &bytes).unwrap();
+    skinrig(&["scene", "check", &text(&raw)])
+        .code(2)
+        .expect_stderr(&["expected a stream of events", "next: `skinrig inspect`"]);
+    // A file that ends within a word, and has lost words: its statistics say so.
+    let word = |kind: u32, rest: u32| ((kind << 28) | rest).to_le_bytes();
+    let mut bytes = b"% evt 2.0\n% end\n".to_vec();
+    for time in 0..200 {
+        bytes.extend(word(8, if time < 100 { time + 100 } else { time }));
+        for at in 0..20 {
+            bytes.extend(word(1, ((at % 60) << 22) | ((at * 7) << 11) | (at * 5)));
+        }
+    }
+    bytes.extend([1, 2]);
+    std::fs::write(&raw, &bytes).unwrap();
+    let told = skinrig(&["scene", "check", &text(&raw)]).code(0).out;
+    assert!(
+        told.contains("the stream has jumps of the time base (1), bytes of an unfinished word (2)"),
+        "{told}"
+    );
     let page = lab.text("check.html");
     let five = vec![other.as_str(); 5];
     skinrig(&[&["scene", "check", "--out", &page][..], &five].concat())

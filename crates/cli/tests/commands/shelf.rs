@@ -137,6 +137,41 @@ fn a_catalogue_changes_no_answer() {
     cannot_be_used(&lab, &file, &found);
 }
 
+/// A copy of a sealed session that was edited does not take the place of the sound one, and one without a seal is not ranked.
+#[test]
+fn sessions_that_may_have_been_edited_are_not_ranked() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    skinrig(&["analyze", &session]).code(0);
+    let best = || {
+        let output = skinrig(&["prototypes", &lab.text("s"), "--json"]).code(0);
+        (output.json()[0]["series"][0].clone(), output.err)
+    };
+    let (sound, _) = best();
+    assert!(sound["best"]["value"].is_number(), "{sound}");
+    let bytes = std::fs::read(&session).unwrap();
+    let edited = |path: &str, statement: &'static str| {
+        std::fs::write(path, &bytes).unwrap();
+        crate::catalogue::change(path.as_ref(), statement);
+    };
+    let copy = lab.text("s/a.session.sqlite");
+    edited(
+        &copy,
+        "UPDATE attempt SET measured_x_mm = measured_x_mm + 1",
+    );
+    let (found, told) = best();
+    assert_eq!(found["best"], sound["best"], "{found}");
+    assert!(told.contains("that was changed"), "{told}");
+
+    std::fs::remove_file(&copy).unwrap();
+    std::fs::remove_file(&session).unwrap();
+    edited(&session, "DELETE FROM seal");
+    skinrig(&["analyze", &session]).code(0);
+    let (found, _) = best();
+    assert!(found["best"].is_null(), "{found}");
+    assert_eq!(found["points"][0]["without"], "not sealed");
+}
+
 /// The lists that need no session of `skin C`.
 fn answers_without_c(lab: &Lab) -> (Vec<Value>, String) {
     let s = lab.text("s");

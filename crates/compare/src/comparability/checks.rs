@@ -110,10 +110,13 @@ fn check_depths(subjects: &[Subject], locations: &Locations) -> Option<Differenc
     let values = sets.iter().map(join_values).collect();
     if locations.shared_depths() == 0 {
         let reason = "deeper presses generate more events, and no depth is shared";
-        return Some(as_blocking(
-            difference("depths", "depths", Severity::Blocking, values, reason),
-            "press both skins to the same depth",
-        ));
+        return Some(Difference {
+            is_final: true,
+            ..as_blocking(
+                difference("depths", "depths", Severity::Blocking, values, reason),
+                "press both skins to the same depth",
+            )
+        });
     }
     let reason = "only shared depths are compared";
     Some(difference(

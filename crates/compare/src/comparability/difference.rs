@@ -45,6 +45,9 @@ pub struct Difference {
     pub reason: String,
     /// What the user can do about a blocking difference.
     pub next: Option<String>,
+    /// True if nothing would be left to compare, whatever the user decides.
+    #[serde(skip)]
+    pub is_final: bool,
     /// True for a blocking difference that the user has overridden.
     #[serde(rename = "lifted")]
     pub overridden: bool,
@@ -66,6 +69,7 @@ pub(super) fn difference(
         severity,
         reason: reason.to_owned(),
         next: None,
+        is_final: false,
         overridden: false,
     }
 }

@@ -38,6 +38,7 @@ pub fn differences(subjects: &[Subject], overrides: &[String]) -> Vec<Difference
     found.extend(of_facts(&sides, &docs(sessions.map(|s| &s.facts))));
     for difference in &mut found {
         difference.overridden = difference.severity == Severity::Blocking
+            && !difference.is_final
             && overrides.iter().any(|k| k == difference.key);
     }
     found.sort_by(|a, b| (a.severity, a.key, &a.what).cmp(&(b.severity, b.key, &b.what)));
@@ -82,6 +83,7 @@ fn of_facts(sides: &[Vec<Facts>], docs: &BTreeMap<&String, &String>) -> Vec<Diff
             severity: rule.severity,
             reason: rule.reason.to_owned(),
             next: rule.next.map(str::to_owned),
+            is_final: false,
             overridden: false,
         });
     }

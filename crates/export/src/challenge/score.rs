@@ -10,10 +10,14 @@ use skinrig_analysis::result::{Estimate, LocationOutcome, Metrics, PressResult};
 use skinrig_analysis::sets::ScoreSet;
 use skinrig_model::{LocationId, Point2, PressId, PressRole, RepetitionId, Verdict};
 
+use super::DESCRIPTION;
 use super::answers::{Answer, Answers, ChallengeSelection};
 use super::error::ChallengeError;
 use super::estimates::{Estimates, Position};
 use super::make::Description;
+
+/// No session has more presses.
+const MOST_PRESSES: u32 = 10_000_000;
 
 /// How good a table of estimates is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -43,11 +47,38 @@ pub fn score(folder: &Path, table: &Path, answers: &Path) -> Result<Judgement, C
     let file = File::open(table).map_err(crate::ExportError::file(table))?;
     let numbers: BTreeSet<u32> = answers.presses.iter().map(|a| a.press).collect();
     let scored: Vec<u32> = numbers.iter().copied().collect();
-    let given = 1..=description.calibrating + description.scored;
+    let given = 1..=presses(folder, &description, &numbers)?;
     let calibrating: Vec<u32> = given.filter(|press| !numbers.contains(press)).collect();
     let estimates =
         Estimates::read(file, &scored, &calibrating, &answers.outline).map_err(refused)?;
     Ok(judge(&answers, &estimates))
+}
+
+/// Number of presses of a challenge, whose description must agree with the answers: both were made from one list.
+fn presses(
+    folder: &Path,
+    description: &Description,
+    answers: &BTreeSet<u32>,
+) -> Result<u32, ChallengeError> {
+    let Description {
+        calibrating,
+        scored,
+        ..
+    } = *description;
+    let total = calibrating.checked_add(scored);
+    let last = answers.last().copied();
+    let agrees = |total: &u32| {
+        answers.len() == scored as usize && *total <= MOST_PRESSES && last <= Some(*total)
+    };
+    total.filter(agrees).ok_or_else(|| ChallengeError::NotAChallenge {
+        path: folder.join(DESCRIPTION),
+        expected: "the numbers of presses that the answers have",
+        found: format!(
+            "{calibrating} calibrating and {scored} scored for {} answers, the last of press {}",
+            answers.len(),
+            last.unwrap_or_default()
+        ),
+    })
 }
 
 /// Scores estimates.

@@ -116,6 +116,22 @@ impl fmt::Display for PressMoment {
     }
 }
 
+/// The first two moments in the wrong order.
+fn in_disorder(times: &[HostTime; 6]) -> String {
+    use PressMoment::{Approach, AtDepth, Clear, Contact, Release, Retract};
+    let moments = [Approach, Contact, AtDepth, Retract, Release, Clear];
+    let mut pairs = times.windows(2).zip(moments.windows(2));
+    match pairs.find(|(t, _)| t[1] < t[0]) {
+        Some((t, moment)) => format!(
+            "the {} {:.3} ms before the {}",
+            moment[1],
+            (t[0] - t[1]).0 as f64 * 1e-6,
+            moment[0]
+        ),
+        None => "them in order".to_owned(),
+    }
+}
+
 /// Fault in the phase times of a press or in its hold.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
@@ -124,7 +140,7 @@ pub enum TimingFault {
     #[error("expected a measured {0}, found none")]
     Missing(PressMoment),
     /// The phase times are not in order.
-    #[error("expected phase times in order, found {0:?}")]
+    #[error("expected phase times in order, found {}", in_disorder(.0))]
     OutOfOrder([HostTime; 6]),
     /// No sample was measured during the hold.
     #[error("expected samples during the hold, found none")]
@@ -248,5 +264,19 @@ impl fmt::Display for PressFault {
             Self::Touch(touch) => touch.fmt(f),
             Self::Timing(moments) => moments.fmt(f),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_moments_in_the_wrong_order_are_named() {
+        let times = [0, 2_000_000, 5_000_000, 4_750_000, 6_000_000, 7_000_000].map(HostTime);
+        assert_eq!(
+            TimingFault::OutOfOrder(times).to_string(),
+            "expected phase times in order, found the start of the retraction 0.250 ms before the settling at depth"
+        );
     }
 }

@@ -144,6 +144,23 @@ fn changed_rows_of_a_sealed_session_are_refused() {
         ],
     );
     SessionReader::open_checked(&path).unwrap();
+    for (n, statement) in [
+        "UPDATE run_end SET status = 'completed', reason = NULL, cause = NULL",
+        "UPDATE run_end SET status = 'completed', reason = NULL",
+        "UPDATE attempt SET cause = '\"never_attempted\"' WHERE verdict = 'valid'",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let changed = folder.path().join(format!("end{n}.session.sqlite"));
+        std::fs::copy(&path, &changed).unwrap();
+        change(&changed, &[statement]);
+        let refused = SessionReader::open_checked(&changed);
+        assert!(
+            matches!(&refused, Err(RecorderError::Contradictory { .. })),
+            "{statement}: {refused:?}"
+        );
+    }
     change(
         &path,
         &["UPDATE session SET protocol_text = protocol_text || '#'"],

@@ -105,6 +105,7 @@ mod tests {
                 origin: "simulated, optical".to_owned(),
                 is_stand_in: true,
                 without_presses: Some("no presses".to_owned()),
+                broken_stream: None,
                 cameras: vec![
                     camera(CameraId::One, Some(law)),
                     camera(CameraId::Two, None),
@@ -115,6 +116,7 @@ mod tests {
                 origin: "RAW file".to_owned(),
                 is_stand_in: false,
                 without_presses: None,
+                broken_stream: Some("3 jumps of the time base".to_owned()),
                 cameras: vec![camera(CameraId::One, None)],
             },
         ];

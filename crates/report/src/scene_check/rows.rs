@@ -15,6 +15,8 @@ pub struct Recording {
     pub is_stand_in: bool,
     /// Why the presses are not known, if it is a session.
     pub without_presses: Option<String>,
+    /// What of a file's stream could not be read.
+    pub broken_stream: Option<String>,
     /// One or two cameras.
     pub cameras: Vec<EventStatistics>,
 }
@@ -126,10 +128,16 @@ pub(super) const ROWS: [(&str, Cell); 17] = [
     }),
 ];
 
-/// Which sessions lack presses, and why.
+/// Which sessions lack presses, and which streams have gaps.
 pub(super) fn remarks(recordings: &[Recording]) -> Vec<String> {
     let rows = recordings.iter().enumerate();
-    rows.filter_map(|(k, r)| Some((letter(k), r.without_presses.as_ref()?)))
-        .map(|(letter, why)| format!("{letter}: no contacts and lifts: {why}"))
-        .collect()
+    rows.flat_map(|(k, r)| {
+        let letter = letter(k);
+        let without = r.without_presses.as_ref();
+        let without = without.map(|why| format!("{letter}: no contacts and lifts: {why}"));
+        let broken = r.broken_stream.as_ref();
+        let broken = broken.map(|what| format!("{letter}: the stream has {what}"));
+        without.into_iter().chain(broken)
+    })
+    .collect()
 }

@@ -148,6 +148,8 @@ fn remarks(input: &ReportInput<'_>) -> Vec<Note> {
         let at = number(Some(row.t_s), 1);
         all.push(("event", format!("{} at {at} s: {}", row.kind, row.reason)));
     }
+    let (grave, others): (Vec<_>, Vec<_>) = a.remarks().partition(|w| w.cause.is_grave());
+    all.extend(grave.iter().map(|w| ("warning", w.to_string())));
     let off_sensor = derive::off_sensor(a);
     all.extend(off_sensor.into_iter().map(|text| ("left out", text)));
     for rejection in derive::rejections(a, false) {
@@ -155,7 +157,7 @@ fn remarks(input: &ReportInput<'_>) -> Vec<Note> {
         all.push(("left out", text));
     }
     all.extend(derive::disagreement(a).map(|text| ("warning", text)));
-    all.extend(a.remarks().map(|w| ("warning", w.to_string())));
+    all.extend(others.iter().map(|w| ("warning", w.to_string())));
     let notes = all.into_iter().map(|(label, text)| {
         let lines = if label == "do" {
             MAX_ADVICE
