@@ -350,3 +350,18 @@ fn foreign_newer_and_damaged_files_are_rejected_and_left_unchanged() {
     let e = refused(&sound[..sound.len() - 4096]);
     assert!(e.to_string().contains("--rebuild"), "{e}");
 }
+
+/// The example of the documentation: every night is accepted, INVALID ones too, and both planted changes are found.
+#[test]
+fn the_simulated_history_shows_its_planted_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    crate::simulated_history::write(folder.path());
+    let history = load(&folder.path().join("history.sqlite"), &Filter::default()).unwrap();
+    assert!(history.nights.len() > 110, "{}", history.nights.len());
+    assert!(history.nights.iter().any(|n| n.verdict == Verdict::Invalid));
+    let report = skinrig_nightly::trend::judge(&history);
+    for planted in ["noise_lit/camera2/rate", "golden/skin/press_events"] {
+        let named = report.charts.iter().find(|c| c.series.name == planted);
+        assert!(named.unwrap().open_excursion().is_some(), "{planted}");
+    }
+}

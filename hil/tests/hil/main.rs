@@ -5,3 +5,6 @@ mod history;
 mod lease;
 mod robot;
 mod runner;
+#[path = "../../examples/simulated_history.rs"]
+#[expect(dead_code, reason = "an example has a `main`")]
+mod simulated_history;
