@@ -241,7 +241,10 @@ pub(crate) fn print_results(
     }
 }
 
-/// Ok, or code 4 when the session is INVALID or the scored RMSE is above the limit (or there is none to compare).
+/// Smallest share of the attempted scored presses whose RMSE may meet a limit: the error of fewer is that of the easy ones.
+const LEAST_LOCATED: f64 = 0.5;
+
+/// Ok, or code 4 when the session is INVALID, or the scored RMSE is above the limit, of few presses, or missing.
 ///
 /// # Errors
 /// [`Failure::limit`].
@@ -264,7 +267,15 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
     let Some(limit) = max_rmse_mm else {
         return Ok(Exit::Ok);
     };
-    match results.analysis.scored.rmse_mm.value {
+    let metrics = &analysis.scored;
+    if let Some(share) = metrics.located_rate.value.filter(|s| *s < LEAST_LOCATED) {
+        return Err(Failure::limit(format!(
+            "scored RMSE: expected that of at least half of the attempted scored presses (--max-rmse), found {:.1} %\n  next: the \
+             report says why each press does not count",
+            100.0 * share
+        )));
+    }
+    match metrics.rmse_mm.value {
         Some(rmse) if rmse <= limit => Ok(Exit::Ok),
         Some(rmse) => Err(Failure::limit(format!(
             "scored RMSE: expected at most {limit} mm (--max-rmse), found {rmse:.3} mm"

@@ -114,7 +114,7 @@ pub(crate) struct RunArgs {
     #[arg(long)]
     pub no_analysis: bool,
 
-    /// Fail (exit code 4) when the scored RMSE exceeds this, in mm.
+    /// Fail (exit code 4) when the scored RMSE exceeds this, in mm, or fewer than half of the scored presses are located.
     #[arg(long, value_name = "MM", value_parser = limit_mm, conflicts_with = "no_analysis")]
     pub max_rmse: Option<f64>,
 }

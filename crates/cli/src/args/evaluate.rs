@@ -45,7 +45,7 @@ pub(crate) struct AnalyzeArgs {
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 
-    /// Fail (exit code 4) when the scored RMSE exceeds this, in mm.
+    /// Fail (exit code 4) when the scored RMSE exceeds this, in mm, or fewer than half of the scored presses are located.
     #[arg(long, value_name = "MM", value_parser = limit_mm)]
     pub max_rmse: Option<f64>,
 }

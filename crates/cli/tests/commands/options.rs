@@ -145,6 +145,17 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
     skinrig(&["analyze", &session, "--max-rmse", &above]).code(0);
     let below = (rmse - 0.01).to_string();
     skinrig(&["analyze", &session, "--max-rmse", &below]).code(4);
+    // The error of the few presses that are left when a rule excludes the others meets no limit, and compares no skins.
+    let few = lab.text("few");
+    let rule = "analysis={calibration: none, cluster_threshold: fixed, min_samples: 20, min_cluster_events: 5000}";
+    let lost = ["run", SMALL, "--sessions", &few, "--set", rule];
+    skinrig(&[&lost[..], &["--max-rmse", "100"]].concat())
+        .code(4)
+        .expect_stderr(&["at least half of the attempted scored presses", "next:"]);
+    let few = text(&only(&lab.path("few"), ".session.sqlite"));
+    skinrig(&["compare", &few, &session, "--out", &lab.text("c.html")])
+        .code(2)
+        .expect_stderr(&["scored presses that count"]);
     // Without an analysis no limit is met.
     skinrig(&["run", SMALL, "--no-analysis", "--max-rmse", "100"])
         .code(2)

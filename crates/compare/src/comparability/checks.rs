@@ -82,19 +82,38 @@ fn check_results(subjects: &[Subject], locations: &Locations) -> Option<Differen
     };
     let counts: Vec<usize> = subjects.iter().map(counted).collect();
     // Without a shared depth no press counts; `depths` reports that.
-    let none = counts.contains(&0) && locations.shared_depths() > 0;
-    none.then(|| {
-        as_blocking(
-            difference(
-                "no-results",
-                "scored presses that count",
-                Severity::Blocking,
-                counts.iter().map(ToString::to_string).collect(),
-                "a skin without a located press has no error to compare",
-            ),
-            "`skinrig analyze` lists why presses do not count",
+    if locations.shared_depths() == 0 {
+        return None;
+    }
+    let attempted: Vec<usize> = subjects
+        .iter()
+        .map(|s| locations.attempts(s).count())
+        .collect();
+    let (key, reason) = if counts.contains(&0) {
+        (
+            "no-results",
+            "a skin without a located press has no error to compare",
         )
-    })
+    } else if counts.iter().zip(&attempted).any(|(n, of)| 2 * n < *of) {
+        (
+            "few-located",
+            "fewer than half of the attempted presses of a skin count, those that are easy to locate: their error is not that of the skin",
+        )
+    } else {
+        return None;
+    };
+    let values = counts.iter().zip(&attempted);
+    let values = values.map(|(n, of)| format!("{n} of {of}")).collect();
+    Some(as_blocking(
+        difference(
+            key,
+            "scored presses that count",
+            Severity::Blocking,
+            values,
+            reason,
+        ),
+        "`skinrig analyze` lists why presses do not count",
+    ))
 }
 
 fn check_depths(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
