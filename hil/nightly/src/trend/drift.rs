@@ -14,7 +14,7 @@ const NIGHTS: usize = 2 * MIN_NIGHTS;
 /// Limit of the test's normal score. The same nights are tested again with each night that joins (false alarms: `docs/reference/nightly.md`).
 const LIMIT: f64 = 4.0;
 /// What a slope that is removed takes from the correlation, times the number of nights: (1 + 4r)/n for a first-order autoregressive
-/// series (M. G. Kendall, Biometrika 41 (1954) 403-404), 1/n of which the reference adds.
+/// series (M. G. Kendall, Biometrika 41 (1954) 403-404), 1/n of which the reference adds; 4r is 2 for r = 0.5.
 const LOST_CORRELATION: f64 = 2.0;
 /// Upper bound of the correlation.
 const MAX_CORRELATION: f64 = 0.9;
