@@ -295,7 +295,7 @@ fn run_leg(
 fn protocol_of(found: &UnfinishedSession) -> Result<Protocol, Failure> {
     let header = &found.header;
     let loader = skinrig_formats::regular::read_text;
-    Protocol::parse(
+    Protocol::parse_recorded(
         &header.protocol_name,
         header.protocol_text.as_bytes(),
         &header.overrides,
@@ -312,9 +312,8 @@ fn rest_of(protocol: &Protocol, plan: &Plan, pending: &[bool]) -> Result<Plan, F
         return Ok(straight);
     }
     let planned = plan.remaining(is_pending, Route::AsPlanned);
-    let checked = protocol.check(&planned);
-    checked.map_err(|found| Failure::findings(&found))?;
-    Ok(planned)
+    let checked = protocol.check(&planned).map(|()| planned);
+    checked.map_err(|found| Failure::findings(&found))
 }
 
 /// Where the simulated skin was pressed in earlier legs. An attempt that is repeated does not count, so that it meets the same
@@ -361,18 +360,16 @@ fn open_rig(
     let header = &found.header;
     let summary = rest.summary();
     if header.rig_kind == "simulated" {
-        if args.tolerant {
-            return Err(Failure::input(format!(
-                "{}: expected no --tolerant, because the simulated rig of this session has no mismatches",
-                args.session.display()
-            )));
-        }
-        if let Some(file) = &args.rig {
-            return Err(Failure::input(format!(
-                "{}: expected no --rig, because the session is of the simulated rig, found {}",
-                args.session.display(),
-                file.display()
-            )));
+        let unfit = match &args.rig {
+            _ if args.tolerant => {
+                "--tolerant, because the simulated rig of this session has no mismatches"
+            }
+            Some(_) => "--rig, because the session is of the simulated rig",
+            None => "",
+        };
+        if !unfit.is_empty() {
+            let session = args.session.display();
+            return Err(Failure::input(format!("{session}: expected no {unfit}")));
         }
         let notifier = notify::for_run(args.notify.as_deref(), None)?;
         let level = found.document.rig["level"].as_str().unwrap_or_default();
@@ -386,7 +383,10 @@ fn open_rig(
             header.seed,
             args.real_time,
             faults,
-            pressed_before(found, pending),
+            rig::EarlierLegs {
+                count: found.legs as u32,
+                pressed: pressed_before(found, pending),
+            },
         )?;
         let mut preflight = gates::of_simulated(&rig, folder, summary.expected_bytes);
         preflight

@@ -139,6 +139,8 @@ pub struct SimConfig {
     pub optical: OpticalConfig,
     /// Earlier contacts, skin frame, for further legs of a run.
     pub pressed_before: Vec<Point2>,
+    /// Number of earlier legs. Each leg has its own noise; the devices and the skin stay.
+    pub legs_before: u32,
     /// Injected faults.
     pub faults: Vec<Fault>,
     /// Sizes of the injected faults.
@@ -190,6 +192,7 @@ impl SimConfig {
             geometric: GeometricConfig::default(),
             optical: OpticalConfig::default(),
             pressed_before: Vec::new(),
+            legs_before: 0,
             faults: Vec::new(),
             fault_sizes: FaultSizes::default(),
         }
@@ -219,7 +222,7 @@ impl SimConfig {
         SceneConfig {
             seed: crate::random::derive_seed(self.seed, Purpose::Pixels, camera.index() as u64),
             skin_seed: crate::random::derive_seed(self.seed, Purpose::Skin, 0),
-            start: 0,
+            start: u64::from(self.legs_before) << 32,
             outline: self.outline,
             camera_id: camera,
             camera: self.true_geometry().cameras[camera.index()],

@@ -69,10 +69,10 @@ pub struct Motion {
 impl Motion {
     /// At rest with the brakes on.
     #[must_use]
-    pub fn new(config: MotionConfig, seed: u64, at: Point3<Robot>) -> Self {
+    pub fn new(config: MotionConfig, seed: u64, legs_before: u32, at: Point3<Robot>) -> Self {
         Self {
             config,
-            noise: Stream::new(seed, Purpose::Robot, 0),
+            noise: Stream::new(seed, Purpose::Robot, u64::from(legs_before)),
             target: None,
             set_point: at.to_array(),
             set_velocity: [0.0; 3],
@@ -232,7 +232,7 @@ mod tests {
         fn set_point_goes_straight_with_limited_speed_and_acceleration(
             to in prop::array::uniform3(-40.0f64..40.0), speed in 1.0f64..60.0,
         ) {
-            let mut m = Motion::new(MotionConfig::default(), 1, Point3::new(0.0, 0.0, 0.0));
+            let mut m = Motion::new(MotionConfig::default(), 1, 0, Point3::new(0.0, 0.0, 0.0));
             m.power_on();
             m.move_to(Point3::new(to[0], to[1], to[2]), speed);
             let length = norm(to);
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn tip_lags_then_settles() {
-        let mut m = Motion::new(MotionConfig::default(), 1, Point3::new(0.0, 0.0, 0.0));
+        let mut m = Motion::new(MotionConfig::default(), 1, 0, Point3::new(0.0, 0.0, 0.0));
         m.power_on();
         m.move_to(Point3::new(10.0, 0.0, 0.0), 20.0);
         for _ in 0..200 {
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn brakes_keep_the_tip() {
-        let mut m = Motion::new(MotionConfig::default(), 1, Point3::new(1.0, 2.0, 3.0));
+        let mut m = Motion::new(MotionConfig::default(), 1, 0, Point3::new(1.0, 2.0, 3.0));
         m.move_to(Point3::new(10.0, 0.0, 0.0), 20.0);
         m.target = None;
         for _ in 0..50 {

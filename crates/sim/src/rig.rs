@@ -113,7 +113,7 @@ fn pixel_factory(config: &SimConfig, id: CameraId) -> PixelFactory {
     }
     Box::new(move |start| -> Option<Box<dyn PixelModel>> {
         let scene = SceneConfig {
-            start,
+            start: scene.start + start,
             ..scene.clone()
         };
         match level {

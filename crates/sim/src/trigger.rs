@@ -37,12 +37,15 @@ impl SimTriggerBox {
     #[must_use]
     pub(crate) fn new(config: &SimConfig, shared: Shared) -> Self {
         let when = |kind| faults::times(&config.faults, kind).next();
+        // The first leg has the indices 0 to 2.
+        let leg = u64::from(config.legs_before) << 32;
+        let of_leg = |index: u64| Stream::new(config.seed, Purpose::TriggerBox, leg + index);
         Self {
             shared,
             config: config.trigger_box,
             serial: format!("sim-{:08x}-t", config.seed as u32),
-            latencies: Stream::new(config.seed, Purpose::TriggerBox, 0),
-            delays: Stream::new(config.seed, Purpose::TriggerBox, 2),
+            latencies: of_leg(0),
+            delays: of_leg(2),
             next_exchange_ns: 0,
             exchange: None,
             lost: when(RigFault::BoxSilent),

@@ -59,7 +59,7 @@ impl World {
     fn new(config: &SimConfig) -> Self {
         let start = config.robot_from_skin.apply(config.start);
         let mut world = Self {
-            motion: Motion::new(config.motion, config.seed, start),
+            motion: Motion::new(config.motion, config.seed, config.legs_before, start),
             skin_from_robot: config.robot_from_skin.inverse(),
             faults: faults::timed(&config.faults).collect(),
             sizes: config.fault_sizes,

@@ -33,20 +33,37 @@ pub fn simulated(
     real_time: bool,
     faults: &[PlantedFault],
 ) -> Result<(Rig, FaultWatch), Failure> {
-    simulated_after(protocol, level, seed, real_time, faults, Vec::new())
+    simulated_after(
+        protocol,
+        level,
+        seed,
+        real_time,
+        faults,
+        EarlierLegs::default(),
+    )
 }
 
-/// Like [`simulated`], for a further leg: the skin was pressed at these locations before.
+/// What was done in earlier legs of a run.
+#[derive(Default)]
+pub(crate) struct EarlierLegs {
+    /// Number of them.
+    pub count: u32,
+    /// Where the skin was pressed.
+    pub pressed: Vec<Point2>,
+}
+
+/// Like [`simulated`], for a further leg: the same devices and skin, with other noise.
 pub(crate) fn simulated_after(
     protocol: &Protocol,
     level: SimLevel,
     seed: u64,
     real_time: bool,
     faults: &[PlantedFault],
-    pressed_before: Vec<Point2>,
+    before: EarlierLegs,
 ) -> Result<(Rig, FaultWatch), Failure> {
     let mut config = SimConfig {
-        pressed_before,
+        pressed_before: before.pressed,
+        legs_before: before.count,
         ..SimConfig::new(seed, level)
     };
     config.outline = protocol.surroundings.outline;

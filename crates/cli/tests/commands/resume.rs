@@ -101,6 +101,36 @@ fn a_resumed_session_gives_the_results_of_one_that_was_never_cut_off() {
     }
 }
 
+#[test]
+fn a_further_leg_of_the_simulated_rig_is_no_copy_of_the_first() {
+    let lab = Lab::new();
+    let sessions = lab.text("s");
+    let killed = [
+        "run",
+        SMALL,
+        "--sessions",
+        &sessions,
+        "--no-analysis",
+        "--fault",
+        "killed@press:6",
+    ];
+    assert_eq!(skinrig(&killed).code, None);
+    let session = only(&lab.path("s"), ".session.sqlite");
+    skinrig(&["resume", &text(&session)]).code(0);
+    let presses = show(&session)["presses"].as_array().unwrap().clone();
+    let depths: Vec<f64> = presses
+        .iter()
+        .filter_map(|p| p["measured_depth_mm"].as_f64())
+        .collect();
+    assert_eq!(depths.len(), 10);
+    for (i, depth) in depths.iter().enumerate() {
+        let same = depths[..i]
+            .iter()
+            .position(|d| d.to_bits() == depth.to_bits());
+        assert_eq!(same, None, "press {}: {depths:?}", i + 1);
+    }
+}
+
 /// A session with only a header, changed by the caller.
 fn begun(
     lab: &Lab,
