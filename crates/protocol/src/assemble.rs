@@ -5,8 +5,8 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use skinrig_model::level_bias::is_measured_for;
 use skinrig_model::pulse::MAX_MARKED_PRESS;
-use skinrig_model::{PulseTrain, SkinOutline, StereoGeometry};
-use skinrig_settings::{Collector, Diagnostics, Field, Settings, Span, open};
+use skinrig_model::{PulseTrain, SimLevel, SkinOutline, StereoGeometry};
+use skinrig_settings::{Collector, Diagnostics, Field, Finding, Settings, Span, open};
 
 use crate::file::hex;
 use crate::keys::{
@@ -14,7 +14,7 @@ use crate::keys::{
 };
 use crate::path::locations;
 use crate::plan::RunLimits;
-use crate::protocol::{Loader, Motion, Pace, Protocol, Sync};
+use crate::protocol::{Loader, Motion, Pace, Protocol, Scene, Sync};
 use crate::surface::Surface;
 use crate::timing;
 
@@ -66,6 +66,9 @@ fn protocol(
         if out.is_clean() {
             check_timing(&protocol, &root, &mut out);
         }
+        if !recorded {
+            within_skin(&protocol.scene, &root, &mut out);
+        }
         Some(protocol)
     });
     match (&mut protocol, out.is_clean()) {
@@ -109,7 +112,20 @@ fn assemble(
     let discarded = &mut Collector::default();
     let limits = LimitKeys::read_parts(root.at("limits"), discarded);
     let motion = MotionKeys::read_parts(root.at("motion"), discarded);
-    depths_within(root, limits.max_depth_mm, out);
+    if let Some(max_mm) = limits.max_depth_mm {
+        let message = "deeper than the limit allows";
+        deeper_than(
+            root,
+            |mm| mm > max_mm,
+            message,
+            out,
+            |finding| {
+                finding
+                    .expected(format!("at most {max_mm} mm, `limits.max_depth`"))
+                    .help("reduce the depth, or raise `limits.max_depth` if the skin can take it")
+            },
+        );
+    }
     check_motion(
         &motion,
         limits.max_speed_mm_s,
@@ -254,24 +270,49 @@ fn declared<T, U>(
     }
 }
 
-/// Checks that no press and no sync press is deeper than the limit.
-fn depths_within(root: &Field, max_mm: Option<f64>, out: &mut Collector) {
-    let Some(max_mm) = max_mm else { return };
+/// Reports the depths of presses and sync presses that are too deep.
+fn deeper_than(
+    root: &Field,
+    is_too_deep: impl Fn(f64) -> bool,
+    message: &'static str,
+    out: &mut Collector,
+    explain: impl for<'a> Fn(Finding<'a>) -> Finding<'a>,
+) {
     let listed = root.get("depths").map_or(&[][..], Field::items).iter();
     let sync = root.get("sync").and_then(|sync| sync.get("depth"));
     for field in listed.chain(root.get("depth")).chain(sync) {
-        let Some(depth_mm) = field.as_quantity().filter(|d| *d > max_mm) else {
+        let Some(depth_mm) = field.as_quantity().filter(|d| is_too_deep(*d)) else {
             continue;
         };
-        out.error(
-            field.span,
-            field.path.as_str(),
-            "deeper than the limit allows",
-        )
-        .expected(format!("at most {max_mm} mm, `limits.max_depth`"))
-        .found(format!("{depth_mm} mm"))
-        .help("reduce the depth, or raise `limits.max_depth` if the skin can take it");
+        explain(out.error(field.span, field.path.as_str(), message))
+            .found(format!("{depth_mm} mm"));
     }
+}
+
+/// Thickness of the published skin (paper, section III), mm.
+const PUBLISHED_THICKNESS_MM: f64 = 4.0;
+
+/// Checks that the tip stays inside the simulated skin.
+fn within_skin(scene: &Scene, root: &Field, out: &mut Collector) {
+    let thickness_mm = match scene.skin {
+        Some(skin) => skin.thickness_mm,
+        None if scene.level == SimLevel::Optical => PUBLISHED_THICKNESS_MM,
+        None => return,
+    };
+    let message = "the press goes through the simulated skin";
+    deeper_than(
+        root,
+        |mm| mm >= thickness_mm,
+        message,
+        out,
+        |finding| {
+            finding
+                .expected(format!("less than {thickness_mm} mm, its thickness"))
+                .help(
+                    "reduce the depth, or set `scene.skin.thickness` to the thickness of your skin",
+                )
+        },
+    );
 }
 
 /// Checks that the motion is consistent and within the limits of speed and depth.

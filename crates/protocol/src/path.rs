@@ -190,19 +190,19 @@ fn csv_points(
     let names: Vec<&str> = header.split(',').map(str::trim).collect();
     let mut columns = [0; 2];
     for (slot, requested) in columns.iter_mut().zip(["x", "y"]) {
-        match names.iter().position(|n| *n == requested) {
-            Some(column) => *slot = column,
-            None => {
-                out.error(
-                    Span::new(source, 0, header.len()),
-                    "",
-                    format!("the column `{requested}` is missing"),
-                )
-                .expected("a header line with `x` and `y`, separated by commas")
-                .found(quote(header));
-                return None;
+        let mut found = (names.iter().enumerate()).filter(|(_, n)| **n == requested);
+        let message = match (found.next(), found.next()) {
+            (Some((column, _)), None) => {
+                *slot = column;
+                continue;
             }
-        }
+            (None, _) => format!("the column `{requested}` is missing"),
+            (Some(_), Some(_)) => format!("two columns are called `{requested}`"),
+        };
+        out.error(Span::new(source, 0, header.len()), "", message)
+            .expected("a header line with `x` and `y`, once each, separated by commas")
+            .found(quote(header));
+        return None;
     }
     let mut points = Vec::new();
     let mut clean = true;

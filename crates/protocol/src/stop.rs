@@ -72,7 +72,14 @@ impl StopKeys {
                 .help("list the repetitions after which to look in `stop.looks`");
             return None;
         }
-        let first = after.first()?;
+        let Some(first) = after.first() else {
+            let looks = field.at("looks");
+            out.error(looks.span, looks.path.as_str(), "no look is declared")
+                .expected("scored repetitions after which to look")
+                .found("none")
+                .help("remove `looks`: there is one look after each scored repetition");
+            return None;
+        };
         let late = roles.iter().rposition(|r| *r == PressRole::Calibrate);
         if let Some(late) = late.filter(|late| *late as u32 > first.index()) {
             let calibrate = evaluation.at("calibrate");
@@ -111,18 +118,20 @@ impl StopKeys {
         let mut after: Vec<RepetitionId> = Vec::new();
         for span in &looks.0 {
             for number in span.first..=span.last {
-                let id = RepetitionId::from_number(number)?;
-                let problem = if !is_scored(id.index()) {
-                    "no scored repetition"
-                } else if after.last().is_some_and(|last| *last >= id) {
-                    "the repetitions are not in ascending order"
-                } else {
-                    after.push(id);
-                    continue;
+                let id = RepetitionId::from_number(number).filter(|id| is_scored(id.index()));
+                let problem = match id {
+                    None => "no scored repetition",
+                    Some(id) if after.last().is_some_and(|last| *last >= id) => {
+                        "the repetitions are not in ascending order"
+                    }
+                    Some(id) => {
+                        after.push(id);
+                        continue;
+                    }
                 };
                 out.error(span.span, path, problem)
                     .expected("scored repetitions in ascending order, each once")
-                    .found(id.to_string());
+                    .found(number.to_string());
                 return None;
             }
         }

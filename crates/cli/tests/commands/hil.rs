@@ -53,7 +53,7 @@ fn what_cannot_be_a_night_is_refused_before_it_begins() {
     let long = suite(
         &lab,
         "10 s",
-        "  clocks: {duration: 60 s, drift: {at_most: 200 ppm}}\n",
+        "  clocks: {duration: 60 s, drift: {at_least: -200 ppm, at_most: 200 ppm}}\n",
     );
     run(&long, &[]).code(2).expect_stderr(&["budget", "next: "]);
     let toothless = suite(&lab, "10 min", "  idle: {duration: 3 s}\n");

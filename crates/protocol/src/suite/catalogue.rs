@@ -6,7 +6,10 @@ use skinrig_model::{HostDuration, Limit};
 use skinrig_settings::{Collector, Field, Setting, Settings, Shape};
 
 use super::check::{Check, Light, Measure, Metric};
-use super::limits::{Count, Data, DataRate, Drift, EventRate, Force, Length, Share, Time};
+use super::limits::{
+    Count, DataRate, Drift, EventRate, Force, Length, Loss, Offset, Ratio, Share, Space, Time,
+    WriteRate,
+};
 
 /// Each check: documentation, file form, key, title, what it measures with which parameters, and its metrics with their limits.
 /// A parameter has the name of the field in [`Measure`]. Suites run the checks in this order.
@@ -106,15 +109,15 @@ checks! {
         amount_b: f64,
     } {
         /// Bytes per second, including the final flush.
-        write_rate: DataRate,
+        write_rate: WriteRate,
         /// Free space.
-        free: Data,
+        free: Space,
     }
 
     /// Coded trains from the trigger box, seen by both cameras.
     CheckTriggerLoopback: trigger_loopback = "trigger loopback" => TriggerLoopback {
         /// Number of trains sent.
-        #[setting(default = "20", min = 1, max = 10_000)]
+        #[setting(default = "20", min = 5, max = 10_000)]
         trains: u32,
     } {
         /// Pulses sent but not received, per camera.
@@ -138,7 +141,7 @@ checks! {
         /// Root mean square of the trains' distances from a straight line, per camera.
         residual: Time,
         /// Time of camera 1 minus that of camera 2 at the same pulse: the offset of their starts.
-        offset: Time,
+        offset: Offset,
     }
 
     /// Data rate and loss with nothing moving.
@@ -150,7 +153,7 @@ checks! {
         /// Bytes per second, per camera.
         data_rate: DataRate,
         /// Bytes known to be lost, per camera.
-        lost: Data,
+        lost: Loss,
         /// Gaps in the stream, per camera.
         gaps: Count,
     }
@@ -199,9 +202,9 @@ checks! {
         rate_ev_s: f64,
     } {
         /// Share of the pattern's events received, per camera.
-        received: Share,
+        received: Ratio,
         /// Bytes known to be lost, per camera.
-        lost: Data,
+        lost: Loss,
         /// Gaps in the stream, per camera.
         gaps: Count,
     }
@@ -231,8 +234,8 @@ checks! {
 
     /// Moves in free air.
     CheckStepResponse: step_response = "robot step response" => StepResponse {
-        /// Length of a move.
-        #[setting(default = "5 mm", above = 0, max = 50)]
+        /// Length of a move; far beyond the 0.1 mm within which it has settled.
+        #[setting(default = "5 mm", min = 1, max = 50)]
         distance_mm: f64,
         /// Number of moves.
         #[setting(default = "5", min = 1, max = 100)]
@@ -299,9 +302,9 @@ checks! {
         /// Shift of the reference presses' estimates from start to end.
         reference_shift: Length,
         /// Events of the reference presses at the end, relative to the start.
-        reference_events: Share,
+        reference_events: Ratio,
         /// Bytes known to be lost, both cameras together.
-        lost: Data,
+        lost: Loss,
     }
 
     /// A short campaign that feels its presses while it records.

@@ -49,6 +49,7 @@ pub struct Suite {
 
 /// Rules for repeating a failed check, and for the resulting verdict. The result keeps every attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Settings)]
+#[settings(check(Self::can_pass, "at_most", "must_pass"))]
 pub struct Repeats {
     /// Most repeats of a failed check; 0: never.
     #[setting(default = "2", max = 10)]
@@ -56,6 +57,23 @@ pub struct Repeats {
     /// Consecutive passes after which a failed check counts as MARGINAL.
     #[setting(default = "2", min = 1, max = 10)]
     pub must_pass: u32,
+}
+
+impl Repeats {
+    /// Rejects repeats after which no check can pass.
+    fn can_pass(at_most: &u32, must_pass: &u32, root: &Field, out: &mut Collector) {
+        if *at_most > 0 && must_pass > at_most {
+            let field = root.at("must_pass");
+            out.error(
+                field.span,
+                field.path.as_str(),
+                "no repeated check can pass",
+            )
+            .expected(format!("at most the number of repeats ({at_most})"))
+            .found(must_pass.to_string())
+            .help("raise `at_most`, or write `at_most: 0`: a failed check is then never repeated");
+        }
+    }
 }
 
 impl Suite {

@@ -323,8 +323,9 @@ fn csv_findings_point_into_the_csv() {
             .to_string()
             .contains("the column `x` is missing")
     );
-    assert!(with(b"x,y\n").is_err());
-    assert!(with(b"\xff\xfe").is_err());
+    let doubled = with(b"x,y,x\n1,2,3\n").unwrap_err().to_string();
+    assert!(doubled.contains("two columns are called `x`"), "{doubled}");
+    assert!(with(b"x,y\n").is_err() && with(b"\xff\xfe").is_err());
     let missing = parse(
         &format!(
             "{}  csv: {{file: no.csv, unit: m}}\n{}",

@@ -67,6 +67,64 @@ checks:
 }
 
 #[test]
+fn limits_that_find_no_fault_or_that_nothing_meets_are_refused() {
+    let all = [
+        (
+            "disk: {write_rate: {at_most: 20 MB/s}}",
+            "`at_least`: large values are good",
+        ),
+        (
+            "disk: {free: {at_least: 0 B}}",
+            "every value is within the limits",
+        ),
+        (
+            "idle: {lost: {at_least: 0 B}}",
+            "`at_most`: small values are good",
+        ),
+        (
+            "idle: {lost: {at_most: -1 B}}",
+            "no value is within the limits",
+        ),
+        (
+            "idle: {data_rate: {at_least: 0 B/s}}",
+            "every value is within the limits",
+        ),
+        (
+            "clocks: {drift: {at_most: 1 ppm}}",
+            "`at_least` and `at_most`",
+        ),
+        (
+            "clocks: {offset: {at_least: 1 ms}}",
+            "`at_least` and `at_most`",
+        ),
+        (
+            "test_pattern: {received: {at_least: 0 %}}",
+            "every value is within the limits",
+        ),
+        (
+            "golden: {protocol: g.yaml, located: {at_least: 101 %}}",
+            "at_least of at most 100",
+        ),
+    ];
+    for (check, expected) in all {
+        let text = format!("skinrig_suite: 1\nname: s\nbudget: 1 min\nchecks:\n  {check}\n");
+        let message = findings(&text);
+        assert!(message.contains(expected), "{check}: {message}");
+        // The limit that it proposes is accepted.
+        let from = message.find("for example `").expect("a proposal") + 13;
+        let proposed = &message[from..from + message[from..].find('`').unwrap()];
+        let limit = &check[check.rfind('{').unwrap()..=check.find('}').unwrap()];
+        let mended = text.replace(limit, proposed);
+        assert!(
+            Suite::parse("suite.yaml", mended.as_bytes()).is_ok(),
+            "{mended}"
+        );
+    }
+    let text = "skinrig_suite: 1\nname: s\nbudget: 1 min\nrepeats: {at_most: 1, must_pass: 5}\nchecks: {identity: {differences: {at_most: 0}}}\n";
+    assert!(findings(text).contains("no repeated check can pass"));
+}
+
+#[test]
 fn a_file_in_another_language_is_recognised() {
     let message = findings("skinrig_rig: 1\nname: x\n");
     assert!(

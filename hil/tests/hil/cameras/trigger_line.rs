@@ -7,7 +7,7 @@ use skinrig_sim::{Fault, FaultTrigger, LineNoise};
 use crate::cameras::bench::{SimBench, kinds_and_subjects, number, value};
 
 const LOOPBACK: &str = "trigger_loopback: {trains: 20, lost_pulses: {at_most: 0}}";
-const CLOCKS: &str = "clocks: {duration: 10 s, drift: {at_most: 1 ppm}}";
+const CLOCKS: &str = "clocks: {duration: 10 s, drift: {at_least: -1 ppm, at_most: 1 ppm}}";
 const CAMERAS: [&str; 2] = ["camera1", "camera2"];
 
 fn bench(faults: Vec<Fault>) -> SimBench {
@@ -192,7 +192,7 @@ fn a_check_returns_soon_after_a_stop_request() {
     let mut bench = bench(Vec::new());
     bench.stop = true;
     for check in [
-        "clocks: {duration: 1 h, drift: {at_most: 1 ppm}}",
+        "clocks: {duration: 1 h, drift: {at_least: -1 ppm, at_most: 1 ppm}}",
         "trigger_loopback: {trains: 10000, jitter: {at_most: 1 us}}",
         "idle: {duration: 1 h, gaps: {at_most: 0}}",
     ] {
