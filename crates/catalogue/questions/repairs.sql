@@ -1,6 +1,6 @@
 WITH result (prototype, sessions, mean_rmse_mm) AS (
     SELECT s.prototype, count(*), avg(a.rmse_mm)
-    FROM session s JOIN analysis a ON a.session_id = s.session_id AND a.name = 'official' AND a.is_valid = 1
+    FROM session s JOIN analysis a ON a.session_id = s.session_id AND a.name = 'official' AND a.is_valid = 1 AND a.located_rate >= 0.5
     WHERE a.rmse_mm IS NOT NULL
     GROUP BY s.prototype
 )

@@ -4,7 +4,7 @@ SELECT s.prototype, count(*) AS sessions, avg(o.rmse_mm) AS official_rmse_mm, av
 FROM analysis v
 JOIN analysis o ON o.session_id = v.session_id AND o.name = 'official'
 JOIN session s ON s.session_id = v.session_id
-WHERE v.name = $1 AND v.is_valid = 1 AND o.is_valid = 1 AND v.rmse_mm IS NOT NULL AND o.rmse_mm IS NOT NULL
+WHERE v.name = $1 AND v.is_valid = 1 AND o.is_valid = 1 AND v.located_rate >= 0.5 AND o.located_rate >= 0.5 AND v.rmse_mm IS NOT NULL AND o.rmse_mm IS NOT NULL
   AND s.content_sha256 IS NOT NULL
 GROUP BY s.prototype, v.changed_json
 ORDER BY mean_difference_mm, s.prototype, v.changed_json

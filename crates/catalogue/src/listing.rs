@@ -40,6 +40,8 @@ pub struct ListedAnalysis {
     pub is_valid: bool,
     /// RMSE of the scored presses, mm.
     pub rmse_mm: EstimateEntry,
+    /// Share of the attempted scored presses that were located; `None` without any.
+    pub located_rate: Option<f64>,
     /// `key=value` of each setting that a variant changes.
     pub changed: Vec<String>,
 }
@@ -107,7 +109,7 @@ const NOTES: &str = "SELECT n.session_id, n.noted_at, n.author, n.text
     ORDER BY n.session_id, n.position";
 
 const ANALYSES: &str = "SELECT a.session_id, a.name, a.problem, a.is_valid, a.rmse_mm, a.rmse_low_mm, a.rmse_high_mm, a.rmse_n,
-        a.changed_json
+        a.changed_json, a.located_rate
     FROM analysis a JOIN session_file f ON f.session_id = a.session_id
     WHERE f.store = $1 AND f.is_source = 1
     ORDER BY a.session_id, a.name";
@@ -215,6 +217,7 @@ fn analysis(row: &[Value]) -> Option<ListedAnalysis> {
             high: real(6),
             n: u32::try_from(row[7].as_integer()?).ok()?,
         },
+        located_rate: real(9),
         changed: serde_json::from_str(&exact(&row[8])?).ok()?,
     })
 }

@@ -226,6 +226,12 @@ mod tests {
                 "{}: numbers of an INVALID analysis are not to be read",
                 question.name
             );
+            assert!(
+                question.sql.contains("located_rate >= 0.5")
+                    || !(question.sql.contains("avg(") && question.sql.contains("rmse_mm")),
+                "{}: the RMSE of few presses is that of the easy ones",
+                question.name
+            );
             let count = question.parameters.len();
             for n in 1..=9 {
                 let used = question.sql.contains(&format!("${n}"));

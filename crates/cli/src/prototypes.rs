@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use skinrig_analysis::result::Estimate;
+use skinrig_analysis::result::{Estimate, LEAST_LOCATED};
 use skinrig_recorder::{SessionState, SessionSummary};
 use skinrig_report::Variant;
 use skinrig_text::{Blocks, Column, Table, sparkline};
@@ -12,7 +12,7 @@ use skinrig_text::{Blocks, Column, Table, sparkline};
 use crate::args::PrototypesArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::sessions::{copies, originals};
-use crate::shelf::Shelf;
+use crate::shelf::{Shelf, ShelfResult};
 
 /// Number of sessions in a sparkline, the latest ones.
 const SPARKS: usize = 16;
@@ -106,11 +106,20 @@ fn entries(folder: &Path, analysis: Option<&str>) -> Result<Vec<Entry>, Failure>
 }
 
 /// RMSE of an analysis, or why it has none that can be used.
-fn usable(is_valid: bool, rmse_mm: Estimate) -> (Option<Estimate>, Option<String>) {
-    match rmse_mm.value {
-        _ if !is_valid => (None, Some("INVALID: do not use".to_owned())),
-        None => (None, Some("no scored press located".to_owned())),
-        Some(_) => (Some(rmse_mm), None),
+fn usable(found: &ShelfResult) -> (Option<Estimate>, Option<String>) {
+    let few = found.located_rate.filter(|share| *share < LEAST_LOCATED);
+    match (found.rmse_mm.value, few) {
+        _ if !found.is_valid => (None, Some("INVALID: do not use".to_owned())),
+        (None, _) => (None, Some("no scored press located".to_owned())),
+        // As for `compare`: the error of those that are easy to locate is not that of the skin.
+        (_, Some(share)) => {
+            let percent = 100.0 * share;
+            (
+                None,
+                Some(format!("only {percent:.1} % of presses located")),
+            )
+        }
+        (Some(_), None) => (Some(found.rmse_mm), None),
     }
 }
 
@@ -134,7 +143,7 @@ fn read(shelf: &Shelf, analysis: Option<&str>) -> Vec<Entry> {
         let (rmse_mm, without) = match &found {
             // As for `compare`: nothing shows that its rows are those that were recorded.
             Ok(_) if !sealed => (None, Some("not sealed".to_owned())),
-            Ok(found) => usable(found.is_valid, found.rmse_mm),
+            Ok(found) => usable(found),
             Err(why) => (None, Some(why.to_string())),
         };
         let (variant, overrides) =
@@ -202,8 +211,8 @@ fn print(all: &[Prototype], each: bool) {
         Column::left(9).clipped(),
         Column::right(8),
         Column::left(16),
-        Column::left(20),
-        Column::left(20),
+        Column::left(27),
+        Column::left(27),
     ]);
     outln!(
         "{}",
@@ -266,7 +275,7 @@ fn print_point(point: &Point) {
         [] => String::new(),
         _ => format!("  [{}]", point.tags.join(" ")),
     };
-    let table = Table::new([Column::left(16), Column::left(20)]).indent(2);
+    let table = Table::new([Column::left(16), Column::left(27)]).indent(2);
     let file = format!("{}{tags}", name.to_string_lossy());
     outln!("{}", table.row([minute(&point.started_at), found, file]));
     print_changes("    ", point);
@@ -294,13 +303,13 @@ fn minute(rfc3339: &str) -> String {
         .replace('T', " ")
 }
 
-/// `2.31 (2.05 to 2.60)`.
+/// `2.31 (2.05 to 2.60), n 162`.
 fn interval(estimate: Option<Estimate>) -> String {
-    match estimate.map(|e| (e.value, e.low, e.high)) {
-        Some((Some(value), Some(low), Some(high))) => {
-            format!("{value:.2} ({low:.2} to {high:.2})")
+    match estimate.map(|e| (e.value, e.low, e.high, e.n)) {
+        Some((Some(value), Some(low), Some(high), n)) => {
+            format!("{value:.2} ({low:.2} to {high:.2}), n {n}")
         }
-        Some((Some(value), ..)) => format!("{value:.2}"),
+        Some((Some(value), .., n)) => format!("{value:.2}, n {n}"),
         _ => "-".to_owned(),
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::digits::Digits;
+use skinrig_analysis::result::LEAST_LOCATED;
 use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, LegStart};
 use skinrig_catalogue::results_digest;
@@ -15,6 +16,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
 use crate::terminal::Output;
 use crate::tradeoff_file::{SessionIdentity, TradeoffFileError};
+use crate::whole_file;
 
 /// The results of one session.
 pub struct Results {
@@ -146,14 +148,15 @@ pub(crate) fn write_results(
     html_path: Option<&Path>,
 ) -> Result<(PathBuf, PathBuf), Failure> {
     let name = results.provenance.variant.as_ref().map(|v| v.name.as_str());
-    let default_path = || analyses::results_path(&results.session, name);
-    let json_path = json_path.map_or_else(default_path, Path::to_owned);
-    let default_path = || analyses::report_path(&results.session, name);
-    let html_path = html_path.map_or_else(default_path, Path::to_owned);
     let (json, html) = documents(results)?;
-    write(&json_path, json.as_bytes())?;
-    write(&html_path, html.as_bytes())?;
-    Ok((json_path, html_path))
+    let to = |named: Option<&Path>, own: PathBuf, text: &str| match named {
+        Some(path) => write_named(path, text.as_bytes()).map(|()| path.to_owned()),
+        None => write(&own, text.as_bytes()).map(|()| own),
+    };
+    let own = analyses::results_path(&results.session, name);
+    let json_path = to(json_path, own, &json)?;
+    let own = analyses::report_path(&results.session, name);
+    Ok((json_path, to(html_path, own, &html)?))
 }
 
 /// Like [`write_results`], with its phase on the terminal.
@@ -182,16 +185,30 @@ pub(crate) fn documents(results: &Results) -> Result<(String, String), Failure> 
 
 /// Writes a whole file or none: a full disk leaves no partial file.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    crate::whole_file::write(path, bytes).map_err(|e| {
-        let next = match e.kind() {
-            std::io::ErrorKind::StorageFull => "free some space, or choose another path with --out",
-            _ => "choose another path with --out",
-        };
-        Failure::internal(format!(
-            "{}: cannot write: {e}\n  next: {next}",
-            path.display()
-        ))
-    })
+    whole_file::write(path, bytes).map_err(|e| unwritten(path, &e))
+}
+
+/// Like [`write`], at the path of an option: never in place of a file of another kind.
+///
+/// # Errors
+/// [`Failure::input`] for such a file; [`Failure::internal`] when it cannot be written.
+pub(crate) fn write_named(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    whole_file::write_named(path, bytes).map_err(|e| unwritten(path, &e))
+}
+
+fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
+    let next = match error.kind() {
+        std::io::ErrorKind::AlreadyExists => {
+            let text = format!("{}: {error}\n  next: name another file", path.display());
+            return Failure::input(text);
+        }
+        std::io::ErrorKind::StorageFull => "free some space, or choose another path with --out",
+        _ => "choose another path with --out",
+    };
+    Failure::internal(format!(
+        "{}: cannot write: {error}\n  next: {next}",
+        path.display()
+    ))
 }
 
 /// The results for programs, with the paths of what was written.
@@ -240,9 +257,6 @@ pub(crate) fn print_results(
         }
     }
 }
-
-/// Smallest share of the attempted scored presses whose RMSE may meet a limit: the error of fewer is that of the easy ones.
-const LEAST_LOCATED: f64 = 0.5;
 
 /// Ok, or code 4 when the session is INVALID, or the scored RMSE is above the limit, of few presses, or missing.
 ///

@@ -43,12 +43,13 @@ pub(crate) fn propose(
         seconds_per_press: seconds_per_press(&analysis),
     };
     let plan = power::plan(&measured, &target).map_err(|e| refused(&e))?;
+    let others = presses_besides(&analysis);
     if json {
-        crate::terminal::print_json(
-            &json!({ "session": session, "metric": "rmse", "unit": "mm", "plan": plan }),
-        );
+        crate::terminal::print_json(&json!({
+            "session": session, "metric": "rmse", "unit": "mm", "plan": plan, "presses_besides": others,
+        }));
     } else {
-        print(&plan, session);
+        print(&plan, others, session);
     }
     Ok(Exit::Ok)
 }
@@ -65,6 +66,12 @@ fn errors(analysis: &Analysis) -> Result<Sample, skinrig_statistics::SampleFault
     }))
 }
 
+/// Presses of the session that are not scored.
+fn presses_besides(analysis: &Analysis) -> usize {
+    let others = analysis.presses.iter();
+    others.filter(|p| p.role != PressRole::Score).count()
+}
+
 /// The median time from one press to the next, s.
 fn seconds_per_press(analysis: &Analysis) -> Option<f64> {
     let begun = analysis.presses.iter().filter_map(|p| p.timing);
@@ -75,7 +82,7 @@ fn seconds_per_press(analysis: &Analysis) -> Option<f64> {
     gaps.get(gaps.len() / 2).copied().filter(|gap| *gap > 0.0)
 }
 
-fn print(plan: &PowerPlan, session: &Path) {
+fn print(plan: &PowerPlan, others: usize, session: &Path) {
     let Target {
         difference,
         power,
@@ -104,7 +111,7 @@ fn print(plan: &PowerPlan, session: &Path) {
         "repetitions",
         "presses",
         "half width",
-        "time for one skin",
+        "time for these presses",
     ];
     outln!("{}", table.row(heads));
     for (i, proposal) in plan.proposals.iter().enumerate() {
@@ -126,6 +133,11 @@ fn print(plan: &PowerPlan, session: &Path) {
         );
     }
     outln!("* fewest presses; half width: expected, of the interval of the difference");
+    if others > 0 {
+        outln!(
+            "scored presses alone; calibrating and sync presses come on top ({others} in this session)"
+        );
+    }
     let MetricVariance {
         value,
         between,
@@ -135,6 +147,11 @@ fn print(plan: &PowerPlan, session: &Path) {
     outln!("");
     outln!("from {}", session.display());
     outln!("  RMSE {value:.3} mm at {locations} locations");
+    if difference > value {
+        outln!(
+            "  the difference is larger than this RMSE: presses on the other skin must not scatter more than these"
+        );
+    }
     if locations < FEW_LOCATIONS {
         outln!("  with so few locations these variances are uncertain: use more than proposed");
     }

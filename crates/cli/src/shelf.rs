@@ -29,6 +29,8 @@ pub(crate) struct Shelf {
 pub(crate) struct ShelfResult {
     pub is_valid: bool,
     pub rmse_mm: Estimate,
+    /// Share of the attempted scored presses that were located.
+    pub located_rate: Option<f64>,
     pub variant: Option<Variant>,
     /// Values overridden when the session was recorded.
     pub overrides: Vec<String>,
@@ -98,6 +100,7 @@ impl Shelf {
                 Ok(ShelfResult {
                     is_valid: official.is_valid,
                     rmse_mm: estimate(official),
+                    located_rate: official.located_rate,
                     variant: None,
                     overrides: listed.overrides.clone(),
                 })
@@ -107,6 +110,7 @@ impl Shelf {
                 Ok(ShelfResult {
                     is_valid: found.valid,
                     rmse_mm: found.rmse_mm,
+                    located_rate: found.located_rate.value,
                     variant: found.variant,
                     overrides: found.overrides,
                 })

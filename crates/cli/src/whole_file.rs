@@ -1,7 +1,7 @@
 //! Writes files atomically, even while other processes write the same one.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -26,6 +26,32 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let _ = fs::remove_file(&partial);
     }
     written
+}
+
+/// Bytes at the start of a file by which its kind is told.
+const START_BYTES: u64 = 4096;
+
+/// Like [`write`], at a path that a user names: replaces only a text that begins like `bytes`, so no recording and no protocol.
+///
+/// # Errors
+/// As [`write`]; [`io::ErrorKind::AlreadyExists`] for a file of another kind, which is then unchanged.
+pub(crate) fn write_named(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if is_of_another_kind(path, bytes) {
+        let found =
+            "expected no file, or an earlier one of the same kind, found a file of another kind";
+        return Err(io::Error::new(io::ErrorKind::AlreadyExists, found));
+    }
+    write(path, bytes)
+}
+
+/// True for a file with zero bytes at its start, or whose first character is not that of `bytes`: JSON, HTML, YAML and columns of text
+/// differ in it. A file that cannot be read is reported by whoever replaces it.
+fn is_of_another_kind(path: &Path, bytes: &[u8]) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(START_BYTES).read_to_end(&mut start));
+    let first = |of: &[u8]| of.iter().copied().find(|b| !b.is_ascii_whitespace());
+    let there = first(&start);
+    read.is_ok() && (start.contains(&0) || there.is_some() && there != first(bytes))
 }
 
 /// Creates a temporary file beside `path` that only this writer uses, locked while it is open.
@@ -102,6 +128,27 @@ mod tests {
         let left = fs::read_to_string(&path).unwrap();
         assert!((1..6).any(|n| left == text(n)));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn only_a_text_that_begins_alike_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        for (there, new, is_replaced) in [
+            (&b"{\"old\": 1}"[..], "{}", true),
+            (b"", "{}", true),
+            (b"<!doctype html>", "<!doctype html>new", true),
+            (b"SQLite format 3\0", "{}", false),
+            (b"{\0", "{}", false),
+            (b"skinrig: 1", "{}", false),
+            (b"skinrig: 1", "<svg/>", false),
+        ] {
+            fs::write(&path, there).unwrap();
+            let written = write_named(&path, new.as_bytes());
+            assert_eq!(written.is_ok(), is_replaced, "{written:?}");
+            let left = if is_replaced { new.as_bytes() } else { there };
+            assert_eq!(fs::read(&path).unwrap(), left);
+        }
     }
 
     #[test]

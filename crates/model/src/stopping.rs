@@ -87,6 +87,9 @@ pub struct Look {
     pub repetition: RepetitionId,
     /// Scored presses that count.
     pub presses: u32,
+    /// Scored presses attempted; `None` in looks of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attempted: Option<u32>,
     /// Metric.
     pub metric: StopMetric,
     /// Question.
@@ -110,6 +113,15 @@ impl Look {
         100.0 * (1.0 - self.alpha)
     }
 
+    /// Number of presses that count, and of how many if some do not.
+    #[must_use]
+    pub fn extent(&self) -> String {
+        match self.attempted {
+            Some(of) if of != self.presses => format!("n {} of {of}", self.presses),
+            _ => format!("n {}", self.presses),
+        }
+    }
+
     /// The metric with its interval and level.
     #[must_use]
     pub fn figure(&self) -> String {
@@ -128,13 +140,10 @@ impl Look {
 impl fmt::Display for Look {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
-            number,
-            declared,
-            presses,
-            ..
+            number, declared, ..
         } = self;
-        let figure = self.figure();
-        write!(f, "look {number} of {declared}: {figure}, n {presses}; ")?;
+        let (figure, extent) = (self.figure(), self.extent());
+        write!(f, "look {number} of {declared}: {figure}, {extent}; ")?;
         match (self.answer, self.question) {
             (None, question) => write!(f, "undecided, the question is {question}"),
             (Some(StopAnswer::Narrow), StopQuestion::NarrowerThan(mm)) => {

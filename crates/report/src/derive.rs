@@ -198,15 +198,23 @@ pub(crate) struct RmseAtLook {
 /// `None` for other sessions: their RMSE has a 95 % interval.
 #[must_use]
 pub(crate) fn rmse_at_look(analysis: &Analysis) -> Option<RmseAtLook> {
-    let look = analysis.campaign.as_ref()?.of_rmse()?;
+    let campaign = analysis.campaign.as_ref()?;
+    let look = campaign.of_rmse()?;
+    // After a look that could not be taken, an earlier one stands for fewer presses than were made.
+    let is_latest = campaign.decided.is_some() || look.presses == analysis.scored.rmse_mm.n;
+    if !is_latest {
+        return None;
+    }
     let end = |mm: Option<f64>| mm.map_or_else(|| "open".to_owned(), |mm| number(Some(mm), 2));
     Some(RmseAtLook {
         value: number(Some(look.value_mm), 2),
         level: number(Some(look.level_percent()), 1),
         interval: format!("[{}, {}]", end(look.low_mm), end(look.high_mm)),
         extent: format!(
-            "n {} presses at look {} of {}",
-            look.presses, look.number, look.declared
+            "{} presses at look {} of {}",
+            look.extent(),
+            look.number,
+            look.declared
         ),
     })
 }

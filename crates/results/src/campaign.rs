@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use skinrig_analysis::Analysis;
-use skinrig_analysis::result::{CampaignLooks, PressResult};
+use skinrig_analysis::result::{CampaignLooks, LEAST_LOCATED, PressResult};
 use skinrig_model::{Look, PressRole, RepetitionId, RunEnd, Verdict};
 use skinrig_protocol::{Plan, Step, Stop};
 use skinrig_statistics::{Settings, StoppingRule, stop_sample};
@@ -39,6 +39,7 @@ pub(crate) fn looks(
         .filter_map(|look| look.look(analysis, &rule).ok());
     Ok(Some(CampaignLooks {
         alpha: rule.alpha,
+        question: rule.question,
         declared: rule.looks,
         looks: looks.collect(),
         decided,
@@ -76,18 +77,25 @@ impl Declared {
 
     /// This look at the scored presses up to its repetition.
     pub(crate) fn look(self, analysis: &Analysis, rule: &Stop) -> Result<Look, LookFault> {
-        let counts = |p: &&PressResult| {
+        let scored = |p: &&PressResult| {
             p.role == PressRole::Score
-                && p.verdict == Verdict::Valid
+                && p.verdict != Verdict::Missed
                 && p.repetition <= self.repetition
         };
-        let presses = analysis.presses.iter().filter(counts);
-        let errors: Vec<(u32, f64)> = presses
+        let scored: Vec<&PressResult> = analysis.presses.iter().filter(scored).collect();
+        let counting = scored.iter().filter(|p| p.verdict == Verdict::Valid);
+        let errors: Vec<(u32, f64)> = counting
             .filter_map(|p| {
                 let (x, y) = p.error_mm()?;
                 Some((p.location.index(), libm::hypot(x, y)))
             })
             .collect();
+        if (errors.len() as f64) < LEAST_LOCATED * scored.len() as f64 {
+            return Err(LookFault::FewLocated {
+                located: errors.len(),
+                attempted: scored.len(),
+            });
+        }
         let sample = stop_sample(rule.metric, errors.iter().copied())?;
         let stopping = StoppingRule {
             question: rule.question,
@@ -106,6 +114,7 @@ impl Declared {
             declared: rule.looks,
             repetition: self.repetition,
             presses: errors.len() as u32,
+            attempted: Some(scored.len() as u32),
             metric: rule.metric,
             question: rule.question,
             alpha: found.alpha,

@@ -93,6 +93,16 @@ pub enum LookFault {
     /// Its number is beyond those of the rule.
     #[error("it is beyond the declared looks")]
     Beyond,
+    /// The error of those that are easy to locate is not that of the skin.
+    #[error(
+        "expected at least half of the attempted scored presses to count, found {located} of {attempted}"
+    )]
+    FewLocated {
+        /// Scored presses that count.
+        located: usize,
+        /// Scored presses attempted.
+        attempted: usize,
+    },
     /// The presses so far make no sample.
     #[error(transparent)]
     Sample(#[from] SampleFault),

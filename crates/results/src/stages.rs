@@ -113,9 +113,14 @@ impl AlignedSession {
         let plan_json = &self.session.header.plan_json;
         let campaign = campaign::looks(&analysis, plan_json, end.as_ref())?;
         analysis.warnings.extend(campaign.as_ref().map(|found| {
-            Warning::from(WarningCause::SequentialLooks {
-                looks: found.looks.len(),
-                declared: found.declared,
+            let (looks, declared) = (found.looks.len(), found.declared);
+            Warning::from(match found.decided {
+                Some(_) => WarningCause::SequentialLooks { looks, declared },
+                None => WarningCause::UndecidedLooks {
+                    looks,
+                    declared,
+                    question: found.question,
+                },
             })
         }));
         if self.session.reader.seal()?.is_none() {

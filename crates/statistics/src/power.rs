@@ -107,8 +107,8 @@ pub fn plan(measured: &MetricVariance, target: &Target) -> Result<PowerPlan, Com
         (
             "power",
             target.power,
-            "a share between 0 and 1",
-            share(target.power),
+            "a share above alpha and below 1",
+            share(target.power) && target.power > target.alpha,
         ),
         (
             "alpha",

@@ -85,7 +85,8 @@ fn required_design(
         .filter(|_| room > 0.0 && both > 0.0)
         .map(|_| (both / room).ceil())
         .filter(|r| *r < f64::from(MAX_LOCATIONS))
-        .map(|r| (r as u32).max(each.ceil() as u32));
+        // The present number did not decide.
+        .map(|r| (r as u32).max(each.floor() as u32 + 1));
     Some(RequiredDesign {
         towards,
         locations: low,

@@ -1,7 +1,7 @@
 //! The question of a campaign, as this analysis answers it.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{Look, StopMetric};
+use skinrig_model::{Look, StopMetric, StopQuestion};
 
 /// Looks of a campaign that ends by itself. Its presses were counted until the data decided, so an interval at the usual
 /// level covers less often than it says; those of the looks hold together.
@@ -9,6 +9,8 @@ use skinrig_model::{Look, StopMetric};
 pub struct CampaignLooks {
     /// Probability that the interval of any look misses the true value.
     pub alpha: f64,
+    /// What decides.
+    pub question: StopQuestion,
     /// Number of declared looks.
     pub declared: u32,
     /// Looks at this analysis, of the repetitions that were completed, up to the one that ended the run.

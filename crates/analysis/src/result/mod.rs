@@ -310,6 +310,10 @@ pub struct Metrics {
     pub rmse_diagonal_percent: Option<f64>,
 }
 
+/// Smallest share of the attempted scored presses whose error may rank a skin, meet a limit or end a campaign: the error of fewer
+/// is that of the easy ones.
+pub const LEAST_LOCATED: f64 = 0.5;
+
 /// RMSE with failures counted. Never below that of the counting presses, nor below that of all presses with an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PenalisedRmse {

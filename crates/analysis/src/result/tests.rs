@@ -259,6 +259,10 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "the looks decided when to end: 95 % intervals do not allow for that, those of the looks do (2 of 5 taken)",
         ),
         (
+            json!({"kind": "undecided_looks", "looks": 4, "declared": 5, "question": {"narrower_than": 0.3}}),
+            "no look found an interval narrower than 0.3 mm (4 of 5 taken): the question of this campaign is open",
+        ),
+        (
             json!({"kind": "stopped_when_felt", "presses": 162, "depth_mm": 0.45}),
             "162 scored presses stopped when they were felt, at 0.45 mm in the median: the planned depth was not reached",
         ),
@@ -344,8 +348,8 @@ fn of_results() -> Vec<(Value, &'static str)> {
         ),
         (
             json!({"kind": "without_reaction", "wanted": "stop", "reacted": 11, "presses": 27}),
-            "the protocol asks presses to stop when they are felt: 11 of 27 valid scored presses did, and the numbers are of \
-             all; the run's notes (`skinrig show`) may say why",
+            "the protocol asks presses to stop when they are felt: 11 of 27 valid scored presses did, and the numbers include all of \
+             them; the run's notes (`skinrig show`) may say why",
         ),
         (
             json!({"kind": "locator_unfit", "wanted": "direct",

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{CalibrationModel, CameraId, Locator, PressId, Reaction};
+use skinrig_model::{CalibrationModel, CameraId, Locator, PressId, Reaction, StopQuestion};
 
 use super::Estimate;
 use crate::clock::{MarksError, RatesError};
@@ -70,6 +70,7 @@ impl WarningCause {
             self,
             Self::NotSealed
                 | Self::WithoutReaction { .. }
+                | Self::UndecidedLooks { .. }
                 | Self::WindowsOverlap
                 | Self::LocatorUnfit { .. }
                 | Self::FewLocationsForModel { .. }
@@ -270,6 +271,18 @@ pub enum WarningCause {
         /// Looks declared.
         declared: u32,
     },
+    /// All that was to be recorded did not answer the question.
+    #[error(
+        "no look found {question} ({looks} of {declared} taken): the question of this campaign is open"
+    )]
+    UndecidedLooks {
+        /// Looks taken.
+        looks: usize,
+        /// Looks declared.
+        declared: u32,
+        /// What decides.
+        question: StopQuestion,
+    },
     /// Presses did not go to their planned depth.
     #[error(
         "{presses} scored presses stopped when they were felt, at {depth_mm:.2} mm in the median: the planned depth was not reached"
@@ -453,8 +466,8 @@ pub enum WarningCause {
     },
     /// The protocol asks for reactions, and presses had none.
     #[error(
-        "the protocol asks presses to {} when they are felt: {reacted} of {presses} valid scored presses did, and the numbers are of \
-         all; the run's notes (`skinrig show`) may say why",
+        "the protocol asks presses to {} when they are felt: {reacted} of {presses} valid scored presses did, and the numbers \
+         include all of them; the run's notes (`skinrig show`) may say why",
         .wanted.verb()
     )]
     WithoutReaction {

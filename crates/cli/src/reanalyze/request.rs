@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::ANALYSIS_VERSION;
+use skinrig_analysis::result::Estimate;
 use skinrig_recorder::{SessionReader, writer_of};
 use skinrig_report::{Summary, Variant};
 
@@ -111,8 +112,8 @@ impl Request {
         page.is_ok_and(|page| page.contains(&summary.results_hash))
     }
 
-    /// Scored RMSE of the official results, in mm, if this version of the analysis made them from this content and they are valid.
-    pub(crate) fn official_rmse_mm(&self) -> Option<f64> {
+    /// Scored RMSE of the official results, if this version of the analysis made them from this content and they are valid.
+    pub(crate) fn official_rmse_mm(&self) -> Option<Estimate> {
         let reader = SessionReader::open(&self.session).ok()?;
         let id = reader.session_id().ok()?;
         let seal = reader.seal().ok()?.map(|seal| seal.content_sha256());
@@ -120,7 +121,7 @@ impl Request {
         let is_comparable = summary.valid
             && summary.analysis_version == ANALYSIS_VERSION
             && summary.content_sha256 == seal;
-        summary.rmse_mm.value.filter(|_| is_comparable)
+        is_comparable.then_some(summary.rmse_mm)
     }
 
     /// True if the results have other settings, or are of another version or content.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
+use skinrig_analysis::result::Estimate;
 use skinrig_report::Summary;
 use skinrig_text::{Column, Table, widest};
 
@@ -48,8 +49,8 @@ pub(super) struct Row {
     pub state: State,
     replaces: bool,
     summary: Option<Summary>,
-    /// Scored RMSE of the official results, in mm.
-    official_mm: Option<f64>,
+    /// Scored RMSE of the official results.
+    official_mm: Option<Estimate>,
     pub error: Option<Refusal>,
 }
 
@@ -100,9 +101,9 @@ impl Row {
         self.summary.as_ref().is_some_and(|summary| !summary.valid)
     }
 
-    fn rmse(&self) -> Option<f64> {
+    fn rmse_mm(&self) -> Option<Estimate> {
         let summary = self.summary.as_ref().filter(|summary| summary.valid)?;
-        summary.rmse_mm.value
+        Some(summary.rmse_mm)
     }
 
     /// File name of the session.
@@ -143,19 +144,38 @@ pub(super) fn print(args: &ReanalyzeArgs, changed: &[String], rows: &[Row], outp
     }
     let names: Vec<String> = shown.iter().map(|row| row.name()).collect();
     let width = widest(names.iter().map(String::as_str)).max(7);
-    let table = Table::new([Column::left(width), Column::left(8), Column::left(0)]);
+    let table = Table::new([
+        Column::left(width),
+        Column::left(8),
+        Column::left(24),
+        Column::left(0),
+    ]);
     outln!(
         "{}",
-        table.row(["session", "state", "RMSE before -> after, mm"])
+        table.row([
+            "session",
+            "state",
+            "RMSE before -> after, mm",
+            "presses located"
+        ])
     );
-    let number = |mm: Option<f64>| mm.map_or("-".to_owned(), |mm| format!("{mm:.3}"));
+    let number = |of: Option<Estimate>| {
+        let mm = of.and_then(|of| of.value);
+        mm.map_or("-".to_owned(), |mm| format!("{mm:.3}"))
+    };
+    let presses = |of: Option<Estimate>| of.map_or("-".to_owned(), |of| of.n.to_string());
     for (row, name) in shown.iter().zip(&names) {
         let rmse = match row.rank() {
             0 => "-".to_owned(),
             1 => format!("{} -> INVALID", number(row.official_mm)),
-            _ => format!("{} -> {}", number(row.official_mm), number(row.rmse())),
+            _ => format!("{} -> {}", number(row.official_mm), number(row.rmse_mm())),
         };
-        outln!("{}", table.row([name.as_str(), row.state.word(), &rmse]));
+        let located = match row.rank() {
+            0 | 1 => String::new(),
+            _ => format!("{} -> {}", presses(row.official_mm), presses(row.rmse_mm())),
+        };
+        let cells = [name.as_str(), row.state.word(), &rmse, &located];
+        outln!("{}", table.row(cells).trim_end());
     }
     if shown.len() < rows.len() {
         outln!("and {} more: -v shows all", rows.len() - shown.len());
@@ -180,7 +200,8 @@ fn document(args: &ReanalyzeArgs, changed: &[String], rows: &[Row]) -> Value {
         json!({
             "session": row.session, "variant": row.variant, "state": row.state.word(),
             "valid": row.summary.as_ref().map(|s| s.valid),
-            "official_rmse_mm": row.official_mm, "rmse_mm": row.rmse(),
+            "official_rmse_mm": row.official_mm.and_then(|of| of.value), "official_presses": row.official_mm.map(|of| of.n),
+            "rmse_mm": row.rmse_mm().and_then(|of| of.value), "presses": row.rmse_mm().map(|of| of.n),
             "results_hash": row.summary.as_ref().map(|s| &s.results_hash),
             "error": row.error.as_ref().map(|e| &e.message),
         })

@@ -172,6 +172,41 @@ fn sessions_that_may_have_been_edited_are_not_ranked() {
     assert_eq!(found["points"][0]["without"], "not sealed");
 }
 
+#[test]
+fn the_error_of_the_few_easy_presses_ranks_no_prototype() {
+    let lab = Lab::new();
+    let lost = [
+        "analysis.min_cluster_events=5500",
+        "analysis.cluster_threshold=fixed",
+    ];
+    let lost = [
+        "--set",
+        lost[0],
+        "--set",
+        lost[1],
+        "--set",
+        "repetitions.count=4",
+    ];
+    let scored = ["--set", "evaluation.score=[1-4]"];
+    let session = lab.record("s", &[&lost[..], &scored].concat());
+    skinrig(&["analyze", &text(&session)]).code(0);
+    let series = || {
+        skinrig(&["prototypes", &lab.text("s"), "--json"])
+            .code(0)
+            .json()[0]["series"][0]
+            .clone()
+    };
+    let with_catalogue = series();
+    let without = with_catalogue["points"][0]["without"].as_str().unwrap();
+    assert!(
+        without.starts_with("only ") && without.ends_with("of presses located"),
+        "{without}"
+    );
+    assert!(with_catalogue["best"].is_null());
+    std::fs::remove_file(lab.path("s/catalogue.sqlite")).unwrap();
+    assert_eq!(series(), with_catalogue);
+}
+
 /// The lists that need no session of `skin C`.
 fn answers_without_c(lab: &Lab) -> (Vec<Value>, String) {
     let s = lab.text("s");

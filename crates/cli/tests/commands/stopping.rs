@@ -85,10 +85,48 @@ fn a_campaign_ends_with_the_look_that_decides() {
 }
 
 #[test]
+fn a_question_is_not_decided_by_losing_presses() {
+    let lab = Lab::new();
+    let sessions = lab.text("s");
+    let output = skinrig(&[
+        "run",
+        SMALL,
+        "--sessions",
+        &sessions,
+        "--set",
+        "repetitions.count=4",
+        "--set",
+        "evaluation.score=[1-4]",
+        "--set",
+        "stop={target: 40 mm}",
+        "--set",
+        "analysis.min_cluster_events=5500",
+        "--set",
+        "analysis.cluster_threshold=fixed",
+    ])
+    .code(0);
+    let session = only(&lab.path("s"), ".session.sqlite");
+    assert_eq!(show(&session)["end"], "completed", "{}", output.out);
+    let notes = SessionReader::open(&session).unwrap().notes().unwrap();
+    let expected = "expected at least half of the attempted scored presses to count, found";
+    assert!(
+        !notes.is_empty() && notes.iter().all(|n| n.text.contains(expected)),
+        "{notes:?}"
+    );
+    assert!(
+        output.out.contains("no look found an interval"),
+        "{}",
+        output.out
+    );
+}
+
+#[test]
 fn an_undecided_campaign_runs_to_its_end() {
     let lab = Lab::new();
     let (session, output) = run(&lab, "s", "{narrower_than: 1e-6 mm}");
     assert!(output.contains("at look 4 of 4"), "{output}");
+    let open = "no look found an interval narrower than 0.000001 mm (4 of 4 taken)";
+    assert!(output.contains(open), "{output}");
     let shown = show(&session);
     assert_eq!(shown["end"], "completed");
     let campaign = &results(&lab, "s")["analysis"]["campaign"];

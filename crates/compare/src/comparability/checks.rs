@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_analysis::result::AlignmentStatus;
+use skinrig_analysis::result::{AlignmentStatus, LEAST_LOCATED};
 use skinrig_model::Reaction;
 
 use super::camera_checks::{ambient, cameras};
@@ -73,6 +73,10 @@ fn check_alignment(subjects: &[Subject]) -> Option<Difference> {
     })
 }
 
+fn is_few(located: usize, attempted: usize) -> bool {
+    (located as f64) < LEAST_LOCATED * attempted as f64
+}
+
 fn check_results(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
     let counted = |s: &Subject| {
         locations
@@ -94,7 +98,7 @@ fn check_results(subjects: &[Subject], locations: &Locations) -> Option<Differen
             "no-results",
             "a skin without a located press has no error to compare",
         )
-    } else if counts.iter().zip(&attempted).any(|(n, of)| 2 * n < *of) {
+    } else if counts.iter().zip(&attempted).any(|(n, of)| is_few(*n, *of)) {
         (
             "few-located",
             "fewer than half of the attempted presses of a skin count, those that are easy to locate: their error is not that of the skin",

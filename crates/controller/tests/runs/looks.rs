@@ -36,6 +36,7 @@ fn look(number: u32, answer: Option<StopAnswer>) -> Look {
         declared: 2,
         repetition: RepetitionId::from_index(0),
         presses: 4,
+        attempted: None,
         metric: StopMetric::Rmse,
         question: StopQuestion::Target(1.0),
         alpha: 0.025,

@@ -89,6 +89,7 @@ fn nothing_is_left_of_a_campaign_whose_question_is_decided() {
         declared: 4,
         repetition: RepetitionId::from_index(1),
         presses: 81,
+        attempted: Some(81),
         metric: StopMetric::Rmse,
         question: StopQuestion::Target(1.0),
         alpha: 0.0125,
@@ -136,6 +137,14 @@ fn a_wrong_stop_is_explained_at_its_place() {
         &["narrower_than", "target"],
     );
     refused("stop: {target: 0 mm}", &["stop.target", "more than 0 mm"]);
+    refused(
+        "stop: {target: 1 mm, looks: []}",
+        &["stop.looks", "no look is declared", "remove `looks`"],
+    );
+    refused(
+        "stop: {target: 1 mm, looks: [0]}",
+        &["stop.looks", "counting starts at 1"],
+    );
     refused(
         "stop: {target: 1 mm, alpha: 60 %}",
         &["stop.alpha", "at most 50"],

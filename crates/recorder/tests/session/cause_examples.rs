@@ -426,6 +426,7 @@ pub(crate) fn decided() -> RunEnd {
         declared: 7,
         repetition: RepetitionId::from_index(2),
         presses: 162,
+        attempted: Some(180),
         metric: StopMetric::Median,
         question: StopQuestion::NarrowerThan(0.3),
         alpha: 0.05 / 7.0,

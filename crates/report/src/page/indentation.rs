@@ -63,6 +63,11 @@ fn totals(found: &Indentation) -> Table {
         }
     }
     let taught = found.depth.as_ref().map_or(0, |q| q.taught_by);
+    if found.depth.as_ref().is_some_and(has_no_intervals) {
+        grid.note(
+            "Single estimates have no 95 % intervals: fewer than 19 calibration presses are too few for one.".to_owned(),
+        );
+    }
     grid.note(format!(
         "Learnt from the events of {taught} calibration presses while the tip presses and releases, not from durations. \
          Left-out locations: calibration presses, each estimated without the presses at its location. Measured depth and \
@@ -124,6 +129,11 @@ fn rest(zero: &ZeroReturn) -> String {
     )
 }
 
+/// True if the calibration presses are too few for intervals of single estimates.
+fn has_no_intervals(depth: &Quantity) -> bool {
+    depth.scored.covered.value.is_none() && depth.left_out.covered.value.is_none()
+}
+
 /// One line for the terminal; `None` without depths.
 pub(crate) fn line(a: &Analysis) -> Option<String> {
     let found = a.indentation.as_ref()?;
@@ -133,11 +143,15 @@ pub(crate) fn line(a: &Analysis) -> Option<String> {
         (None, None) => return None,
     };
     let mut text = format!(
-        "RMSE {} mm {}, {} mm at left-out locations",
+        "RMSE {} mm {}, n {} presses, {} mm at left-out locations",
         number(depth.scored.rmse.value, 2),
         interval(&depth.scored.rmse, 1.0, 2),
+        depth.scored.rmse.n,
         number(depth.left_out.rmse.value, 2),
     );
+    if has_no_intervals(depth) {
+        text += "; no intervals: too few calibration presses";
+    }
     if found.zero.is_some_and(|z| z.drifts) {
         text += "; does not return to zero: drift";
     }

@@ -133,6 +133,8 @@ fn remarks(input: &ReportInput<'_>) -> Vec<Note> {
     all.extend(a.findings.first().map(|f| ("do", f.advice.clone())));
     let reasons = a.invalid_because();
     all.extend(reasons.into_iter().map(|why| ("INVALID", why)));
+    let (grave, others): (Vec<_>, Vec<_>) = a.remarks().partition(|w| w.cause.is_grave());
+    all.extend(grave.iter().map(|w| ("warning", w.to_string())));
     if a.is_valid() {
         all.extend(derive::geometry_note(a).map(|text| ("geometry", text)));
         all.extend(other_counts(a).map(|text| ("RMSE", text)));
@@ -148,8 +150,6 @@ fn remarks(input: &ReportInput<'_>) -> Vec<Note> {
         let at = number(Some(row.t_s), 1);
         all.push(("event", format!("{} at {at} s: {}", row.kind, row.reason)));
     }
-    let (grave, others): (Vec<_>, Vec<_>) = a.remarks().partition(|w| w.cause.is_grave());
-    all.extend(grave.iter().map(|w| ("warning", w.to_string())));
     let off_sensor = derive::off_sensor(a);
     all.extend(off_sensor.into_iter().map(|text| ("left out", text)));
     for rejection in derive::rejections(a, false) {

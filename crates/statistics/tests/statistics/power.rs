@@ -91,6 +91,11 @@ fn a_target_out_of_range_is_refused() {
             power: 1.0,
             ..target(1.0)
         },
+        // As likely as a false alarm.
+        Target {
+            power: 0.05,
+            ..target(1.0)
+        },
         Target {
             alpha: 0.0,
             ..target(1.0)
