@@ -125,7 +125,7 @@ fn true_digits(
         .map_err(|e| Failure::from(skinrig_results::ResultsError::from(e)))
 }
 
-/// A note if results of another version of the analysis are about to be replaced.
+/// A note if results of another version of the analysis, or of other settings under the same name, are about to be replaced.
 fn replacement_note(results: &Results, out: Option<&Path>) -> Option<String> {
     let name = results.provenance.variant.as_ref().map(|v| v.name.as_str());
     let id = &results.provenance.session_id;
@@ -133,9 +133,20 @@ fn replacement_note(results: &Results, out: Option<&Path>) -> Option<String> {
         .ok()
         .filter(|_| out.is_none())?;
     let (then, now) = (before.analysis_version, results.analysis.version);
+    if then != now {
+        return Some(format!(
+            "note: the results of analysis version {then} are replaced by those of version {now}"
+        ));
+    }
+    let changes = |v: &Option<Variant>| v.as_ref().map(Variant::changes_with_selection);
+    let (then, now) = (
+        changes(&before.variant)?,
+        changes(&results.provenance.variant)?,
+    );
     (then != now).then(|| {
         format!(
-            "note: the results of analysis version {then} are replaced by those of version {now}"
+            "note: the variant `{}` of other settings ({then}) is replaced",
+            name.unwrap_or_default()
         )
     })
 }

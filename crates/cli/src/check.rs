@@ -130,9 +130,8 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
         Err(rejection) => rejection.planned.as_ref(),
     };
     if let (Some(file), Some(CheckedProtocol { protocol, plan })) = (&args.svg, drawn) {
-        std::fs::write(file, path_svg(plan, &protocol.surroundings)).map_err(|e| {
-            Failure::internal(format!("{}: cannot write the path: {e}", file.display()))
-        })?;
+        let drawing = path_svg(plan, &protocol.surroundings);
+        crate::results::write_named(file, drawing.as_bytes())?;
     }
     let checked = read.map_err(|rejection| Failure::findings(&rejection.found))?;
     let summary = checked.plan.summary();

@@ -15,7 +15,7 @@ use crate::analysis_request::AnalysisRequest;
 use crate::args::{SceneArgs, SceneCheckArgs, SceneCommand};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
-use crate::results::{open, write};
+use crate::results::{open, write_named};
 
 /// Recordings that fit side by side on a page.
 const MOST_ON_PAGE: usize = 4;
@@ -40,7 +40,7 @@ fn check(args: &SceneCheckArgs, json: bool) -> Outcome {
     let recordings = args.recordings.iter().map(|path| recording(path));
     let recordings = recordings.collect::<Result<Vec<_>, _>>()?;
     if let Some(out) = &args.out {
-        write(out, page(&recordings).as_bytes())?;
+        write_named(out, page(&recordings).as_bytes())?;
     }
     if json {
         let rows = recordings.iter().map(|r| {

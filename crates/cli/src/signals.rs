@@ -78,6 +78,9 @@ impl Operator {
         on_ctrl_c(move |times| {
             if is_over.load(Ordering::SeqCst) {
                 // The robot is at rest and the session is closed.
+                errln!(
+                    "\nthe session is closed; only its analysis was cut off\n  next: `skinrig analyze` of the session"
+                );
                 std::process::exit(i32::from(Exit::Stopped.code()));
             }
             requested_flag.store(true, Ordering::SeqCst);

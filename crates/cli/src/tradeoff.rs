@@ -22,7 +22,7 @@ use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::file_name;
 use crate::phase::Phase;
-use crate::results::{not_official, open, write};
+use crate::results::{not_official, open, write, write_named};
 use crate::selection;
 use crate::signals::on_ctrl_c;
 use crate::terminal::Output;
@@ -321,6 +321,11 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
     let text = results_digest::with_digest(&text);
     let html = page(result, &file_name(&target.path), &rig);
+    let write = if args.out.is_some() {
+        write_named
+    } else {
+        write
+    };
     write(&html_path, html.as_bytes())?;
     write(&json_path, text.as_bytes())?;
     if output.json {

@@ -1,6 +1,9 @@
 //! The list of commands in the help, grouped by task.
 
-use clap::{Command, CommandFactory, FromArgMatches};
+use std::collections::BTreeMap;
+
+use clap::error::ErrorKind;
+use clap::{ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use skinrig_text::{LongWords, Paint, hang};
 
@@ -64,7 +67,38 @@ where
 {
     let mut command = command();
     let matches = command.try_get_matches_from_mut(words)?;
+    if let Some(twice) = given_twice(&matches) {
+        return Err(command.error(ErrorKind::ArgumentConflict, twice));
+    }
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+}
+
+/// Says which value of a protocol is given twice and differently, by `--set` or by an option of its own; `None` if none is.
+fn given_twice(matches: &ArgMatches) -> Option<String> {
+    let (_, matches) = matches.subcommand()?;
+    let overrides = matches.try_get_many::<String>("overrides").ok()??;
+    let option = |id: &str| {
+        let given = matches.try_get_raw(id).ok()??.next()?;
+        Some(given.to_string_lossy().into_owned())
+    };
+    let mut given: BTreeMap<&str, (String, String)> = BTreeMap::new();
+    for (key, id) in [("seed", "seed"), ("scene.level", "level")] {
+        if let Some(value) = option(id) {
+            given.insert(key, (value.clone(), format!("--{id} {value}")));
+        }
+    }
+    for (key, value) in overrides.filter_map(|text| text.split_once('=')) {
+        let how = format!("--set {key}={value}");
+        match given.insert(key, (value.to_owned(), how.clone())) {
+            Some((earlier, by)) if earlier != value => {
+                return Some(format!(
+                    "expected one value of `{key}`, found `{by}` and `{how}`"
+                ));
+            }
+            _ => {}
+        }
+    }
+    None
 }
 
 /// The command line with its grouped help.

@@ -19,7 +19,7 @@ use crate::analysis_request::AnalysisRequest;
 use crate::args::CompareArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
-use crate::results::{open, write};
+use crate::results::{open, write_named};
 
 /// Default file name of the page.
 const PAGE: &str = "comparison.html";
@@ -147,8 +147,8 @@ fn write_page(
     let results = page.with_extension("json");
     let html = report::html(result);
     let text = serde_json::to_string_pretty(document).map_err(Failure::internal)?;
-    write(page, html.as_bytes())?;
-    write(&results, text.as_bytes())?;
+    write_named(page, html.as_bytes())?;
+    write_named(&results, text.as_bytes())?;
     Ok(results)
 }
 

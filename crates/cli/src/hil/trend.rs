@@ -41,8 +41,7 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     if let Some(file) = &args.html {
         let links: Vec<Links> = alarm_links.iter().map(|k| k.links(file.parent())).collect();
         let html = page(&report, &links, &history.accepted);
-        std::fs::write(file, html)
-            .map_err(|e| Failure::internal(format!("{}: {e}", file.display())))?;
+        crate::results::write_named(file, html.as_bytes())?;
     }
     if json {
         let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;

@@ -188,7 +188,35 @@ fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failu
         .map(|p| Point2::new(p.x_mm * scale, p.y_mm * scale))
         .collect();
     check_positions(path, schedule, &points)?;
+    for note in ignored(schedule, &table, scale) {
+        errln!("note: {}: {note}", path.display());
+    }
     Ok(points)
+}
+
+/// Smallest difference in z that is another depth, mm.
+const OTHER_DEPTH_MM: f64 = 0.1;
+
+/// What the table says and the import does not use: depths other than the schedule's, and further columns.
+fn ignored(schedule: &Schedule, table: &PositionTable, scale: f64) -> Vec<String> {
+    let depth_mm = schedule.depth_mm;
+    let z_mm = table.presses.iter().filter_map(|p| p.z_mm);
+    let ends = z_mm.map(|z| z * scale).fold(None, |ends, z| {
+        let (low, high) = ends.unwrap_or((z, z));
+        Some((z.min(low), z.max(high)))
+    });
+    let depth = ends.and_then(|(low, high)| {
+        // Positions on the surface have 0.
+        let is = |z: f64| low >= z - OTHER_DEPTH_MM && high <= z + OTHER_DEPTH_MM;
+        (!is(0.0) && !is(-depth_mm)).then(|| {
+            format!(
+                "z from {low:.3} to {high:.3} mm is not used: every press is taken as {depth_mm} mm deep, the `depth` of the schedule"
+            )
+        })
+    });
+    let columns = (!table.other_columns.is_empty())
+        .then(|| format!("not used: column(s) {}", table.other_columns.join(", ")));
+    depth.into_iter().chain(columns).collect()
 }
 
 /// Rejects positions off the skin or all on one spot, which a wrong unit causes.

@@ -198,6 +198,7 @@ pub(crate) fn jog(args: &JogArgs) -> Outcome {
         stop,
         search: bench.search,
         speed_mm_s: FIRST_SPEED_MM_S.min(setup.limits.max_speed_mm_s),
+        most_mm_s: setup.limits.max_speed_mm_s,
         idle,
         skin_from_robot: bench.robot_from_skin.inverse(),
         last_touch: None,
@@ -233,6 +234,8 @@ struct Console {
     stop: Arc<AtomicBool>,
     search: TouchSearch,
     speed_mm_s: f64,
+    /// Limit of the rig.
+    most_mm_s: f64,
     /// Time without input after which the arm is disarmed.
     idle: Duration,
     skin_from_robot: RigidTransform<Skin, Robot>,
@@ -363,6 +366,12 @@ impl Console {
                 self.go(target, &stop)
             }
             JogCommand::To(target) => self.go(target, &stop),
+            JogCommand::Speed(mm_s) if mm_s > self.most_mm_s => {
+                Err(Refusal::Input(InputError::TooFast {
+                    mm_s,
+                    most_mm_s: self.most_mm_s,
+                }))
+            }
             JogCommand::Speed(speed_mm_s) => {
                 self.speed_mm_s = speed_mm_s;
                 Ok(format!("speed {speed_mm_s} mm/s"))
@@ -432,8 +441,14 @@ fn read_lines() -> Result<Receiver<String>, Failure> {
     std::thread::Builder::new()
         .name("jog-input".to_owned())
         .spawn(move || {
-            for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-                if sender.send(line).is_err() {
+            let mut input = std::io::stdin().lock();
+            let mut line = Vec::new();
+            // Input that cannot be read ends the session like its end.
+            while input.read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
+                // A line of another encoding is a command that does not exist.
+                let text = String::from_utf8_lossy(&line).trim_end().to_owned();
+                line.clear();
+                if sender.send(text).is_err() {
                     return; // the receiver is gone
                 }
             }

@@ -22,6 +22,14 @@ pub(super) enum InputError {
     /// `point` without a touch before it.
     #[error("expected a touch since the last point, found none; `touch` first")]
     NoTouch,
+    /// Faster than the limits of the rig.
+    #[error("expected at most {most_mm_s} mm/s, the limit of this rig, found {mm_s} mm/s")]
+    TooFast {
+        /// The speed, mm/s.
+        mm_s: f64,
+        /// The limit, mm/s.
+        most_mm_s: f64,
+    },
     /// The motion would go below the floor.
     #[error(
         "{0}\n  next: check where the skin is; if it is lower than in the rig file's frame, start `skinrig jog` \

@@ -163,6 +163,23 @@ fn the_folder_gives_no_position_of_a_scored_press_away() {
     ];
     skinrig(&command).code(2).expect_stderr(&["--answers"]);
     assert!(!Path::new(&inside).exists());
+    // Nor the session with all its labels.
+    let beside = text(challenge.session.parent().unwrap());
+    let session = text(&challenge.session);
+    let parts = ["for the challenge alone", "--out"];
+    let answers = challenge.lab.text("a.json");
+    skinrig(&[
+        "challenge",
+        "make",
+        &session,
+        "--out",
+        &beside,
+        "--answers",
+        &answers,
+    ])
+    .code(2)
+    .expect_stderr(&parts);
+    assert!(!Path::new(&answers).exists());
 }
 
 #[test]

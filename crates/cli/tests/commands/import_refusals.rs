@@ -73,6 +73,32 @@ fn files_of_another_kind() {
 }
 
 #[test]
+fn columns_that_are_not_used_are_named() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let import = |name: &str, header: &str, z: &dyn Fn(usize) -> &'static str| {
+        let rows = positions().into_iter().enumerate();
+        let rows = rows.map(|(i, p)| format!("{},{},{}\n", p.x_mm / 1e3, p.y_mm / 1e3, z(i)));
+        let table = header.to_owned() + &rows.collect::<String>();
+        std::fs::write(&data.presses, table).unwrap();
+        skinrig(&data.arguments(&lab.path(name))).code(0).err
+    };
+    let told = import("depths", "x,y,z,force\n", &|i| {
+        if i == 3 { "-0.003,1" } else { "-0.002,1" }
+    });
+    for part in [
+        "z from -3.000 to -2.000 mm is not used: every press is taken as 2 mm deep",
+        "not used: column(s) force",
+    ] {
+        assert!(told.contains(part), "{part}\n{told}");
+    }
+    for z in ["-0.002", "0"] {
+        let told = import(z, "x,y,z\n", &|_| z);
+        assert!(!told.contains("not used"), "{told}");
+    }
+}
+
+#[test]
 fn a_truncated_container() {
     let lab = Lab::new();
     let data = Dataset::new(&lab);

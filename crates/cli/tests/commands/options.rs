@@ -80,6 +80,86 @@ fn a_wrong_override_is_refused_with_a_suggestion() {
 }
 
 #[test]
+fn no_option_replaces_a_session_or_a_protocol() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &["--set", "analysis.bootstrap_resamples=50"]));
+    let other = lab.text("other.session.sqlite");
+    let protocol = lab.text("p.yaml");
+    std::fs::copy(&session, &other).unwrap();
+    std::fs::copy(format!("{ROOT}/{SMALL}"), &protocol).unwrap();
+    let before = [&session, &other, &protocol].map(|path| std::fs::read(path).unwrap());
+    for command in [
+        ["analyze", &session, "--out", &session],
+        ["analyze", &session, "--out", &other],
+        ["report", &session, "--out", &other],
+        ["tradeoff", &session, "--out", &other],
+        ["plan", &protocol, "--svg", &protocol],
+        ["plan", &protocol, "--svg", &other],
+        ["analyze", &session, "--out", &protocol],
+    ] {
+        skinrig(&command)
+            .code(2)
+            .expect_stderr(&["found a file of another kind", "name another file"]);
+    }
+    let scene = ["scene", "check", &session, "--out", &other];
+    skinrig(&scene).code(2).expect_stderr(&["of another kind"]);
+    let after = [&session, &other, &protocol].map(|path| std::fs::read(path).unwrap());
+    assert!(before == after, "a file was changed");
+    // What the same command wrote before is replaced.
+    let out = lab.text("o.json");
+    for _ in 0..2 {
+        skinrig(&["analyze", &session, "--out", &out]).code(0);
+    }
+    let variant = |samples: &str| {
+        let set = format!("analysis.min_samples={samples}");
+        skinrig(&["analyze", &session, "--set", &set, "--name", "x"])
+            .code(0)
+            .err
+    };
+    assert!(!variant("5").contains("is replaced"));
+    let told = variant("60");
+    assert!(
+        told.contains("the variant `x` of other settings (analysis.min_samples=5)"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_value_given_twice_is_refused_and_not_the_last_one_taken() {
+    for (twice, parts) in [
+        (
+            ["--set", "depth=1 mm", "--set", "depth=1.5 mm"],
+            ["`depth`", "--set depth=1.5 mm"],
+        ),
+        (
+            ["--seed", "5", "--set", "seed=6"],
+            ["--seed 5", "--set seed=6"],
+        ),
+        (
+            ["--level", "optical", "--set", "scene.level=kinematic"],
+            ["--level optical", "--set scene.level=kinematic"],
+        ),
+    ] {
+        let run = [&["run", SMALL, "--sessions", "/nowhere"], &twice[..]].concat();
+        skinrig(&run).code(2).expect_stderr(&parts);
+    }
+    let same = ["check", SMALL, "--set", "depth=1 mm", "--set", "depth=1 mm"];
+    skinrig(&same).code(0);
+}
+
+#[test]
+fn a_press_stays_inside_the_simulated_skin() {
+    let thin = ["check", SMALL, "--set", "scene.skin={thickness: 1 mm}"];
+    skinrig(&thin).code(2).expect_stderr(&[
+        "the press goes through the simulated skin",
+        "less than 1 mm",
+        "`scene.skin.thickness`",
+    ]);
+    let thicker = ["check", SMALL, "--set", "scene.skin={thickness: 2 mm}"];
+    skinrig(&thicker).code(0);
+}
+
+#[test]
 fn all_errors_of_a_protocol_are_reported_at_once() {
     let lab = Lab::new();
     let good = std::fs::read_to_string(format!("{ROOT}/{SMALL}")).unwrap();

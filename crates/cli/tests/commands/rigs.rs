@@ -195,7 +195,7 @@ fn presses_that_touch_are_recorded_and_replayed() {
 }
 
 /// Jogs the simulated rig with these input lines, logging to `log`.
-fn jog(lines: &str, log: &str) -> ProgramOutput {
+fn jog(lines: impl AsRef<[u8]>, log: &str) -> ProgramOutput {
     let mut child = program(&["jog", "--log", log])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -203,7 +203,7 @@ fn jog(lines: &str, log: &str) -> ProgramOutput {
         .spawn()
         .unwrap();
     // The program may exit before reading all input.
-    let _ = child.stdin.take().unwrap().write_all(lines.as_bytes());
+    let _ = child.stdin.take().unwrap().write_all(lines.as_ref());
     let output = child.wait_with_output().unwrap();
     ProgramOutput {
         code: output.status.code(),
@@ -271,7 +271,7 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
         ("jump 3mm", "found `jump`"),
         ("x 3", "the bare number"),
         ("to 200 0 0 mm", "expected a target with x"),
-        ("speed 500 mm/s\nx 1mm", "expected a speed above 0"),
+        ("speed 500 mm/s", "expected at most"),
         ("point a", "`touch` first"),
         // Sideways after a touch: the tip is at most 2 mm up.
         (
@@ -283,7 +283,7 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
     .enumerate()
     {
         let log = lab.text(&format!("{i}.log"));
-        let jog_output = jog(&format!("{line}\nz +1mm\n"), &log)
+        let jog_output = jog(format!("{line}\nz +1mm\n"), &log)
             .code(2)
             .expect_stderr(&[words]);
         assert!(jog_output.out.contains("disarmed at"), "{jog_output:?}");
@@ -293,6 +293,10 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
             "{log}"
         );
     }
+    // A line that is no text is not the end of the input.
+    jog(b"z +1mm\n\xff\nz +1mm\n", &lab.text("bytes.log"))
+        .code(2)
+        .expect_stderr(&["expected x, y, z"]);
 }
 
 #[test]

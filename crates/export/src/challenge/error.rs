@@ -27,6 +27,16 @@ pub enum ChallengeError {
         /// Why, as the report states it.
         because: Vec<String>,
     },
+    /// The folder holds more than the challenge, for example its session.
+    #[error(
+        "{}: expected a folder for the challenge alone, which is given away whole, found other files there\n  next: name a new folder \
+         with --out",
+        path.display()
+    )]
+    NotAlone {
+        /// A file that does not belong to it.
+        path: PathBuf,
+    },
     /// The answers would lie in the folder that is given away.
     #[error("{}: the answers would lie in the folder of the challenge\n  next: choose another file with --answers", path.display())]
     Unsealed {

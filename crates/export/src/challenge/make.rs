@@ -150,6 +150,13 @@ pub fn make(
     let scored = presses.iter().filter(|p| p.is_scored()).count();
     let calibrating = presses.len() - scored;
     let out = Folder::new(folder, STEM, making.overwrite)?;
+    for entry in std::fs::read_dir(folder).map_err(ExportError::file(folder))? {
+        let path = entry.map_err(ExportError::file(folder))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if !name.starts_with(STEM) {
+            return Err(ChallengeError::NotAlone { path });
+        }
+    }
     let resolved = |path: &Path| std::fs::canonicalize(path).map_err(ExportError::file(path));
     let parent = answers.parent().filter(|p| !p.as_os_str().is_empty());
     let parent = parent.unwrap_or_else(|| Path::new("."));
