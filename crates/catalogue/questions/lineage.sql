@@ -16,6 +16,6 @@ SELECT f.generation, f.name, min(p.relation) AS relation, min(p.parent) AS paren
 FROM family f
 LEFT JOIN prototype p ON p.name = f.name
 LEFT JOIN session s ON s.prototype = f.name
-LEFT JOIN analysis a ON a.session_id = s.session_id AND a.name = 'official' AND a.is_valid = 1
+LEFT JOIN analysis a ON a.session_id = s.session_id AND a.name = 'official' AND a.is_valid = 1 AND a.located_rate >= 0.5
 GROUP BY f.generation, f.name
 ORDER BY f.generation, f.name

@@ -80,8 +80,9 @@ use crate::rule::Rule;
 /// end their search where the likelihood gains less than 0.001. Version 13: calibrations and located
 /// positions have at least nine correct digits where the problem is well posed. Version 14: so have held-out errors; the
 /// estimated depth treats ON and OFF alike, and intervals are wider for few locations. Version 16: a depth that presses stopped short of has no
-/// errors of its own. Version 19: a place that a plan lists again is one location.
-pub const ANALYSIS_VERSION: u32 = 19;
+/// errors of its own. Version 19: a place that a plan lists again is one location. Version
+/// 20: a look needs half of the presses, and an open question is a warning.
+pub const ANALYSIS_VERSION: u32 = 20;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -83,7 +83,8 @@ pub(crate) fn text(value: &Value) -> &str {
 pub(crate) fn rmse(session: &SessionEntry) -> Option<f64> {
     let official = session.analyses.iter().find(|a| a.name == "official")?;
     let figures = official.figures.as_ref().ok().filter(|f| f.is_valid)?;
-    figures.rmse_mm.value
+    let is_of_the_skin = figures.located_rate.is_some_and(|share| share >= 0.5);
+    figures.rmse_mm.value.filter(|_| is_of_the_skin)
 }
 
 pub(crate) fn mean(values: &[f64]) -> f64 {

@@ -241,6 +241,7 @@ impl SyntheticLab {
                     ("yaw_2_deg".into(), Some(self.unit()), None),
                 ],
             }),
+            located_rate: Some(if self.is(95) { 0.97 } else { 0.49 }),
             ..AnalysisFigures::default()
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use skinrig_analysis::result::{AlignmentStatus, LEAST_LOCATED};
-use skinrig_model::Reaction;
+use skinrig_model::{Reaction, Verdict};
 
 use super::camera_checks::{ambient, cameras};
 use super::difference::{Difference, Severity, as_blocking, difference};
@@ -210,7 +210,12 @@ fn check_stopped(subjects: &[Subject]) -> Option<Difference> {
     let stopped = |s: &Session| {
         let reactions = s.analysis.felt.as_ref()?.reactions.as_ref()?;
         let depths = &reactions.depth_mm;
-        (reactions.reaction == Reaction::Stop).then_some((depths.n, depths.median?))
+        let scored =
+            s.analysis.presses.iter().filter(|p| {
+                p.role == skinrig_model::PressRole::Score && p.verdict == Verdict::Valid
+            });
+        let stops = reactions.reaction == Reaction::Stop;
+        stops.then_some((depths.n, scored.count(), depths.median?))
     };
     let sessions = || subjects.iter().flat_map(|s| &s.sessions);
     let (stops, all) = (sessions().filter_map(stopped).count(), sessions().count());
@@ -218,7 +223,9 @@ fn check_stopped(subjects: &[Subject]) -> Option<Difference> {
         return None;
     }
     let values = each(subjects, |s| match stopped(s) {
-        Some((presses, mm)) => format!("{presses} stopped, at {mm:.2} mm in the median"),
+        Some((presses, of, mm)) => {
+            format!("{presses} of {of} stopped, at {mm:.2} mm in the median")
+        }
         None => "none stopped".to_owned(),
     });
     let what = "presses that stopped when they were felt";
