@@ -66,6 +66,7 @@ fn export_one(
     let header = reader.header().map_err(Failure::session)?;
     let folder = folder(args, target, if is_bundle { ".bundle" } else { ".export" })?;
     let (written, invalid) = if is_bundle {
+        holds_only(&folder, &stem(&target.path))?;
         let (mut written, invalid) = bundle(&target.path, &reader, &header, &folder)?;
         if let Some(key) = &args.sign {
             written.push(signature::sign(key, &folder.path().join(MANIFEST))?);
@@ -75,6 +76,22 @@ fn export_one(
         files(args, target, &reader, &header, &folder)?
     };
     Ok((folder, written, invalid))
+}
+
+/// Rejects a folder with files of others: a bundle does not verify with a file that its manifest does not list.
+fn holds_only(folder: &Folder, stem: &str) -> Result<(), Failure> {
+    let failed = |e| Failure::internal(format!("{}: {e}", folder.path().display()));
+    for entry in std::fs::read_dir(folder.path()).map_err(failed)? {
+        let name = entry.map_err(failed)?.file_name();
+        let name = name.to_string_lossy();
+        if !name.starts_with(stem) && !name.starts_with(MANIFEST) {
+            return Err(Failure::input(format!(
+                "{}: expected a folder for the bundle alone, found {name} there\n  next: name a new folder with --out",
+                folder.path().display()
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// The folder given with `--out`, else one beside the session. Files from a selection carry its label.

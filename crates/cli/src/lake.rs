@@ -80,7 +80,8 @@ pub(crate) fn lake(args: &LakeArgs, json: bool) -> Outcome {
         return Ok(Exit::Ok);
     }
     let summary = format!(
-        "{}: {left_out} sessions left out\n  next: `skinrig resume` seals a session; `skinrig report` explains an INVALID one",
+        "{}: {left_out} sessions left out\n  next: mend what the lines above name, and repeat the command; `skinrig resume` seals a session, \
+         `skinrig report` explains an INVALID one",
         args.to.display()
     );
     Err(match failed {

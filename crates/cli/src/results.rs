@@ -202,8 +202,8 @@ fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
             let text = format!("{}: {error}\n  next: name another file", path.display());
             return Failure::input(text);
         }
-        std::io::ErrorKind::StorageFull => "free some space, or choose another path with --out",
-        _ => "choose another path with --out",
+        std::io::ErrorKind::StorageFull => "free some space, or choose another path",
+        _ => "choose another path",
     };
     Failure::internal(format!(
         "{}: cannot write: {error}\n  next: {next}",

@@ -47,6 +47,9 @@ pub(crate) fn write_named(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// True for a file with zero bytes at its start, or whose first character is not that of `bytes`: JSON, HTML, YAML and columns of text
 /// differ in it. A file that cannot be read is reported by whoever replaces it.
 fn is_of_another_kind(path: &Path, bytes: &[u8]) -> bool {
+    if !path.is_file() {
+        return false;
+    }
     let mut start = Vec::new();
     let read = File::open(path).and_then(|file| file.take(START_BYTES).read_to_end(&mut start));
     let first = |of: &[u8]| of.iter().copied().find(|b| !b.is_ascii_whitespace());

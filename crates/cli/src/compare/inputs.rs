@@ -66,10 +66,12 @@ fn skin_sessions(
     } else if path.is_file() {
         (None, selection::sessions(path)?.sessions)
     } else if text.contains(std::path::MAIN_SEPARATOR)
-        || text.ends_with(crate::paths::SESSION_SUFFIX)
+        || [crate::paths::SESSION_SUFFIX, ".yaml", ".yml"]
+            .iter()
+            .any(|ending| text.ends_with(ending))
     {
         return Err(Failure::input(format!(
-            "{text}: expected a session, a folder of sessions or the name of a prototype, found no such file\n  \
+            "{text}: expected a session, a selection, a folder of sessions or the name of a prototype, found no such file\n  \
              next: `skinrig sessions` lists what is there"
         )));
     } else {

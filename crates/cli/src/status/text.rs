@@ -156,14 +156,19 @@ fn print_live(live: &RunSnapshot) {
 }
 
 fn print_planned(totals: &SessionTotals) {
-    let both = |of: fn(&PressTally) -> u64| of(&totals.presses) + of(&totals.sync);
-    let text = format!(
-        "{} planned: {} valid, {} invalid, {} missed, {} excluded",
-        both(|t| t.planned),
-        both(|t| t.valid),
-        both(|t| t.invalid),
-        both(|t| t.missed),
-        both(|t| t.excluded)
+    let PressTally {
+        planned,
+        valid,
+        invalid,
+        missed,
+        excluded,
+    } = &totals.presses;
+    let mut text = format!(
+        "{planned} planned: {valid} valid, {invalid} invalid, {missed} missed, {excluded} excluded"
     );
+    if totals.sync.planned > 0 {
+        let sync = &totals.sync;
+        text += &format!("; {} of {} sync presses valid", sync.valid, sync.planned);
+    }
     line("press", &text);
 }

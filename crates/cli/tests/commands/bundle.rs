@@ -100,4 +100,19 @@ fn a_bundle_is_exported_alone() {
     skinrig(&export).code(2).expect_stderr(&["no other format"]);
     let session_and_catalogue = 2;
     assert_eq!(files(&lab.path("s"), "").len(), session_and_catalogue);
+    // Beside other files it would not verify.
+    let folder = lab.text("b");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(lab.path("b/other.txt"), "mine").unwrap();
+    let export = ["export", &session, "--to", "bundle", "--out", &folder];
+    skinrig(&export)
+        .code(2)
+        .expect_stderr(&["for the bundle alone, found other.txt"]);
+    assert_eq!(files(&lab.path("b"), "").len(), 1);
+    std::fs::remove_file(lab.path("b/other.txt")).unwrap();
+    skinrig(&export).code(0);
+    skinrig(&["verify", &folder]).code(0);
+    let status = skinrig(&["status", &session]).code(0).out;
+    assert!(status.contains("8 planned: 8 valid"), "{status}");
+    assert!(status.contains("0 excluded; 2 of 2 sync"), "{status}");
 }
