@@ -11,6 +11,11 @@ use crate::support::{Lab, SMALL, files, only, read_json, show, skinrig, text};
 
 /// The small campaign, killed during a press of its second repetition.
 fn cut_off(lab: &Lab) -> PathBuf {
+    killed(lab, "killed@journal:20")
+}
+
+/// The small campaign, killed at this fault.
+fn killed(lab: &Lab, fault: &str) -> PathBuf {
     let sessions = lab.text("cut");
     let run = skinrig(&[
         "run",
@@ -19,7 +24,7 @@ fn cut_off(lab: &Lab) -> PathBuf {
         &sessions,
         "--no-analysis",
         "--fault",
-        "killed@journal:20",
+        fault,
     ]);
     assert_eq!(run.code, None, "{run:#?}");
     only(&lab.path("cut"), ".session.sqlite")
@@ -104,18 +109,7 @@ fn a_resumed_session_gives_the_results_of_one_that_was_never_cut_off() {
 #[test]
 fn a_further_leg_of_the_simulated_rig_is_no_copy_of_the_first() {
     let lab = Lab::new();
-    let sessions = lab.text("s");
-    let killed = [
-        "run",
-        SMALL,
-        "--sessions",
-        &sessions,
-        "--no-analysis",
-        "--fault",
-        "killed@press:6",
-    ];
-    assert_eq!(skinrig(&killed).code, None);
-    let session = only(&lab.path("s"), ".session.sqlite");
+    let session = killed(&lab, "killed@press:6");
     skinrig(&["resume", &text(&session)]).code(0);
     let presses = show(&session)["presses"].as_array().unwrap().clone();
     let depths: Vec<f64> = presses

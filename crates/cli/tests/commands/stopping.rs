@@ -10,9 +10,14 @@ use crate::support::{Lab, SMALL, only, read_json, show, skinrig, text};
 
 /// The small campaign with two more scored repetitions, and a question.
 fn run(lab: &Lab, folder: &str, stop: &str) -> (PathBuf, String) {
+    run_with(lab, folder, stop, &[])
+}
+
+/// The same, with more arguments.
+fn run_with(lab: &Lab, folder: &str, stop: &str, more: &[&str]) -> (PathBuf, String) {
     let sessions = lab.text(folder);
     let stop = format!("stop={stop}");
-    let output = skinrig(&[
+    let arguments = [
         "run",
         SMALL,
         "--sessions",
@@ -23,8 +28,8 @@ fn run(lab: &Lab, folder: &str, stop: &str) -> (PathBuf, String) {
         "evaluation.score=[1-4]",
         "--set",
         &stop,
-    ])
-    .code(0);
+    ];
+    let output = skinrig(&[&arguments[..], more].concat()).code(0);
     (only(&lab.path(folder), ".session.sqlite"), output.out)
 }
 
@@ -87,37 +92,21 @@ fn a_campaign_ends_with_the_look_that_decides() {
 #[test]
 fn a_question_is_not_decided_by_losing_presses() {
     let lab = Lab::new();
-    let sessions = lab.text("s");
-    let output = skinrig(&[
-        "run",
-        SMALL,
-        "--sessions",
-        &sessions,
-        "--set",
-        "repetitions.count=4",
-        "--set",
-        "evaluation.score=[1-4]",
-        "--set",
-        "stop={target: 40 mm}",
+    let lost = [
         "--set",
         "analysis.min_cluster_events=5500",
         "--set",
         "analysis.cluster_threshold=fixed",
-    ])
-    .code(0);
-    let session = only(&lab.path("s"), ".session.sqlite");
-    assert_eq!(show(&session)["end"], "completed", "{}", output.out);
+    ];
+    let (session, output) = run_with(&lab, "s", "{target: 40 mm}", &lost);
+    assert_eq!(show(&session)["end"], "completed", "{output}");
     let notes = SessionReader::open(&session).unwrap().notes().unwrap();
     let expected = "expected at least half of the attempted scored presses to count, found";
     assert!(
         !notes.is_empty() && notes.iter().all(|n| n.text.contains(expected)),
         "{notes:?}"
     );
-    assert!(
-        output.out.contains("no look found an interval"),
-        "{}",
-        output.out
-    );
+    assert!(output.contains("no look found an interval"), "{output}");
 }
 
 #[test]
