@@ -29,7 +29,7 @@ pub enum ChallengeError {
     },
     /// The folder holds more than the challenge, for example its session.
     #[error(
-        "{}: expected a folder for the challenge alone, which is given away whole, found other files there\n  next: name a new folder \
+        "{}: expected a folder for the challenge alone, which is given away whole, found this file in it\n  next: name a new folder \
          with --out",
         path.display()
     )]

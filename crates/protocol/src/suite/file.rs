@@ -71,7 +71,7 @@ impl Repeats {
             )
             .expected(format!("at most the number of repeats ({at_most})"))
             .found(must_pass.to_string())
-            .help("raise `at_most`, or write `at_most: 0`: a failed check is then never repeated");
+            .help("raise `at_most`, lower `must_pass`, or write `at_most: 0`: no repeats");
         }
     }
 }
