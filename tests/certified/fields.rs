@@ -48,6 +48,7 @@ pub(crate) fn solve(problem: &Problem) -> Solution {
         }),
         inflation: 1.0,
         levels: Vec::new(),
+        learnt: None,
     };
     let locator = match FittedLocator::new(Locator::Direct, StereoGeometry::PAPER, model) {
         Ok(locator) => locator,

@@ -76,7 +76,13 @@ fn a_plan_may_list_its_presses_in_any_order() {
         },
         // Lists by press, and random choices by press or in the order of the plan.
         silent: &|kind| {
-            let lists = ["pictures", "zooms", "indentation", "latency.onsets"];
+            let lists = [
+                "pictures",
+                "zooms",
+                "indentation",
+                "latency.onsets",
+                "locator.model.learnt",
+            ];
             let random = [
                 "reduction.curves[].rows",
                 "latency.reduced",

@@ -15,14 +15,30 @@ pub(super) struct Row {
     pub measured: f64,
 }
 
-/// Errors at scored presses and at left-out locations. Of scored presses, those at `unreached` depths have none by depth.
+/// What the calibration presses taught.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Taught {
+    /// Their number.
+    pub by: u32,
+    /// Smallest and largest measurement.
+    pub from_to: [f64; 2],
+}
+
+/// Errors at scored presses and at left-out locations. Scored presses beyond what was taught have none; of the others, those at
+/// `unreached` depths have none by depth.
 pub(super) fn quantity(
     scored: &[Row],
     left_out: &[Row],
     unreached: &[f64],
-    taught_by: u32,
+    taught: Taught,
     settings: &AnalysisSettings,
 ) -> Quantity {
+    let all = scored.len();
+    let scored = scored.iter().copied();
+    let scored: Vec<Row> = scored
+        .filter(|r| Quantity::teaches(taught.from_to, r.measured))
+        .collect();
+    let scored = scored.as_slice();
     let mut depths: Vec<f64> = scored.iter().chain(left_out).map(|r| r.depth_mm).collect();
     depths.sort_by(f64::total_cmp);
     depths.dedup();
@@ -47,7 +63,9 @@ pub(super) fn quantity(
         scored: errors(scored, settings),
         left_out: errors(left_out, settings),
         depths: each.collect(),
-        taught_by,
+        taught_by: taught.by,
+        taught: taught.from_to,
+        beyond: (all - scored.len()) as u32,
     }
 }
 
@@ -88,7 +106,11 @@ mod tests {
             measured: 0.4,
         };
         let rows: Vec<Row> = (0..8).flat_map(|k| [row(k, 1.0), row(k, 2.0)]).collect();
-        let found = quantity(&rows, &rows, &[2.0], 8, &AnalysisSettings::default());
+        let taught = Taught {
+            by: 8,
+            from_to: [0.4, 2.0],
+        };
+        let found = quantity(&rows, &rows, &[2.0], taught, &AnalysisSettings::default());
         let n = |q: &QuantityErrors| q.rmse.n;
         let by_depth: Vec<_> = found
             .depths
@@ -96,6 +118,16 @@ mod tests {
             .map(|d| (n(&d.scored), n(&d.left_out)))
             .collect();
         assert_eq!(by_depth, [(8, 8), (0, 8)]);
-        assert_eq!(n(&found.scored), 16);
+        assert_eq!((n(&found.scored), found.beyond), (16, 0));
+        // Measured at 0.4 mm, within a tenth of 0.44 and not of 0.45.
+        for (least, n_scored) in [(0.44, 16), (0.45, 0)] {
+            let taught = Taught {
+                from_to: [least, 2.0],
+                ..taught
+            };
+            let found = quantity(&rows, &rows, &[], taught, &AnalysisSettings::default());
+            let of = (n(&found.scored), found.beyond, n(&found.left_out));
+            assert_eq!(of, (n_scored, 16 - n_scored, 16));
+        }
     }
 }

@@ -33,6 +33,8 @@ pub(super) struct Teacher {
 pub(super) struct Learnt {
     regression: Regression,
     intervals: Intervals,
+    /// Smallest and largest measurement of the teachers.
+    pub taught: [f64; 2],
     /// Each teacher by a model that has not seen its location.
     pub left_out: Vec<Option<Ranged>>,
 }
@@ -66,6 +68,11 @@ impl Learnt {
             .collect();
         let regression = Regression::fit(&pairs, None).ok_or(NoQuantity::Degenerate)?;
         let presses: Vec<CalibrationPress> = teachers.iter().map(|t| t.press).collect();
+        let measured = || teachers.iter().map(|t| t.measured);
+        let taught = [
+            measured().fold(f64::INFINITY, f64::min),
+            measured().fold(0.0, f64::max),
+        ];
         let folds = Folds::deal(&presses, seed);
         let held = folds.each(|_, kept, held| {
             let part: Vec<_> = kept.iter().map(|i| pairs[*i]).collect();
@@ -88,14 +95,26 @@ impl Learnt {
             left_out: left_out.collect(),
             regression,
             intervals,
+            taught,
         })
     }
 
-    /// The quantity of a press.
+    /// The quantity of a press. Beyond what was taught it has no interval: nothing says how the skin answers there.
     pub(super) fn estimate(&self, observation: &Observation) -> Option<Ranged> {
         let prediction = self.regression.predict(observation)?;
-        Some(self.intervals.around(prediction))
+        let mut ranged = self.intervals.around(prediction);
+        ranged.interval = ranged
+            .interval
+            .filter(|ends| !is_beyond(ranged.value, *ends, self.taught));
+        Some(ranged)
     }
+}
+
+/// True if a value with this interval is beyond what was `taught` by more than half of the way to the interval's end: a standard
+/// deviation. By noise alone, one of six presses at the outermost depth is.
+fn is_beyond(value: f64, [low, high]: [f64; 2], taught: [f64; 2]) -> bool {
+    let halfway = |end: f64| (value * end).sqrt();
+    halfway(high) < taught[0] || halfway(low) > taught[1]
 }
 
 impl Intervals {
@@ -164,6 +183,17 @@ fn unlikelihood(errors: &[(Prediction, f64)], inflation: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_nobody_taught_is_beyond() {
+        let taught = [1.5, 2.5];
+        assert!(is_beyond(1.2, [0.86, 1.68], taught));
+        assert!(is_beyond(3.0, [2.5, 3.6], taught));
+        // By noise, presses at the ends seem shallower or deeper than they are.
+        assert!(!is_beyond(1.45, [1.2, 1.75], taught));
+        assert!(!is_beyond(2.6, [2.3, 2.9], taught));
+        assert!(!is_beyond(2.0, [1.7, 2.4], taught));
+    }
 
     #[test]
     fn an_interval_is_the_conformal_quantile() {

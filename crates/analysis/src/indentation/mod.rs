@@ -22,7 +22,7 @@ use skinrig_model::{PressId, PressRole, StereoGeometry, Verdict};
 pub(crate) use collector::{PhaseCollector, PressPhases};
 pub(crate) use phases::{PhasePlan, phase_plans};
 
-use errors::{Row, quantity};
+use errors::{Row, Taught, quantity};
 use features::{Observation, Scales};
 use learn::{Learnt, Teacher};
 use zero::{Habit, is_observed, zero_return};
@@ -76,7 +76,8 @@ pub(crate) fn estimate(
         })
         .collect();
     rows.sort_by_key(|r| r.press);
-    let zero = zero(input, &seen, presses, &set, &mut rows);
+    let taught = depth.as_ref().ok().map(|(learnt, _)| learnt.taught);
+    let zero = taught.and_then(|taught| zero(input, &seen, presses, &set, taught, &mut rows));
     let tables = [false, true].map(|is_force| error_rows(presses, &rows, is_force));
     let [depth_rows, force_rows] = tables;
     let (depth, no_depth) = summary(input, depth, depth_rows);
@@ -207,25 +208,30 @@ fn summary(
             })
         })
         .collect();
-    let taught_by = teachers.len() as u32;
+    let taught = Taught {
+        by: teachers.len() as u32,
+        from_to: learnt.taught,
+    };
     (
         Some(quantity(
             &scored,
             &left_out,
             &input.unreached_depths_mm(),
-            taught_by,
+            taught,
             &input.settings,
         )),
         None,
     )
 }
 
-/// Fills in what is left of each press, and sums it up over the valid scored ones.
+/// Fills in what is left of each press, and sums it up over the valid scored ones of `taught` depths: what is left of a shallow press is
+/// less than what is left of deep ones.
 fn zero(
     input: &SessionInput,
     seen: &[SeenPress<'_>],
     presses: &[PressResult],
     set: &CalibrationSet,
+    taught: [f64; 2],
     rows: &mut [PressIndentation],
 ) -> Option<ZeroReturn> {
     let observed = |s: &&SeenPress<'_>| s.phases.iter().all(|p| is_observed(p));
@@ -247,6 +253,8 @@ fn zero(
         let depth = rows[at].depth_mm.map(|d| d.value);
         rows[at].rest_mm = depth.and_then(|mm| habit.rest_mm(s.phases, mm));
         let scores = press.role == PressRole::Score && press.verdict == Verdict::Valid;
+        let measured = rows[at].measured_mm;
+        let scores = scores && measured.is_none_or(|mm| Quantity::teaches(taught, mm));
         if let Some(mm) = rows[at].rest_mm.filter(|_| scores) {
             rests.push((press.location.index(), mm));
             let seconds = s.phases.iter().map(|p| p.seconds[AFTER]);

@@ -6,6 +6,7 @@ use skinrig_model::{Locator, Point2, SkinOutline, StereoGeometry};
 use super::features::{CameraFeatures, Features};
 use super::fit_error::LocatorModelError;
 use super::inverse::Inverse;
+use super::learnt_area::LearntArea;
 use super::prediction::{Prediction, Uncertainty, ellipse};
 use super::rays::Rays;
 use super::reading::Reading;
@@ -20,9 +21,10 @@ use crate::triangulate::locate;
 pub struct Location {
     /// Position, mm.
     pub at: [f64; 2],
-    /// 95 % region about it; `None` if too few calibration presses determine it.
+    /// 95 % region about it; `None` if too few calibration presses determine it, or beyond them.
     pub region: Option<Region>,
-    /// True if the columns are beyond those of the calibration presses: the position is close to that of the base alone.
+    /// True beyond the calibration presses: of the position, or of the columns that a field has seen, where the position is close to that
+    /// of the base alone.
     pub extrapolated: bool,
 }
 
@@ -32,6 +34,7 @@ pub struct FittedLocator {
     locator: Locator,
     geometry: StereoGeometry,
     model: LocatorModel,
+    area: Option<LearntArea>,
     way: Solver,
 }
 
@@ -84,6 +87,7 @@ impl FittedLocator {
         Ok(Self {
             locator,
             geometry,
+            area: model.learnt.as_ref().map(LearntArea::new),
             model,
             way,
         })
@@ -104,7 +108,9 @@ impl FittedLocator {
                 prior: None,
                 inflation: 1.0,
                 levels: Vec::new(),
+                learnt: None,
             },
+            area: None,
             way: Solver::Rays(Box::new(Rays::new(&geometry, None))),
         }
     }
@@ -158,11 +164,21 @@ impl FittedLocator {
             .and_then(|u| u.covariance(self.model.inflation))
             .zip(factor)
             .and_then(|(covariance, level)| ellipse(covariance, level.factor));
+        let extrapolated = prediction.extrapolated || self.is_beyond(prediction.at, region);
+        let region = region.filter(|_| !extrapolated);
         Some(Location {
             at: prediction.at,
             region,
-            extrapolated: prediction.extrapolated,
+            extrapolated,
         })
+    }
+
+    /// True if a position is beyond the calibration presses even if it is off by its region, or without one by half a step.
+    fn is_beyond(&self, at: [f64; 2], region: Option<Region>) -> bool {
+        let reach_mm = region.map(|r| r.semi_axes_mm[0]);
+        self.area
+            .as_ref()
+            .is_some_and(|area| !area.is_near(at, reach_mm))
     }
 
     /// The region of another level in place of the 95 % one; `None` if the calibration presses do not determine it.

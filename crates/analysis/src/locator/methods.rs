@@ -13,7 +13,7 @@ use super::robust::reference_events;
 use super::samples::samples;
 use super::spread::SpreadFits;
 use crate::distinct::distinct;
-use crate::result::{CameraField, LocatorModel, PositionPrior};
+use crate::result::{CameraField, LearntPlaces, LocatorModel, PositionPrior};
 use crate::sets::{CalibrationPress, CalibrationSet};
 
 /// Input of a method.
@@ -123,6 +123,7 @@ impl Method for Geometry {
             prior: None,
             inflation: 1.0,
             levels: Vec::new(),
+            learnt: LearntPlaces::of(presses),
         };
         let fitted = FittedLocator::new(Locator::Geometry, start.geometry, model);
         fitted.map(|f| (f, None)).map_err(|_| FitError::Degenerate)
@@ -220,6 +221,7 @@ fn with_fields(
         prior: Some(prior(presses)),
         inflation: 1.0,
         levels: Vec::new(),
+        learnt: LearntPlaces::of(presses),
     };
     let fitted =
         FittedLocator::new(locator, start.geometry, model).map_err(|_| FitError::Degenerate)?;

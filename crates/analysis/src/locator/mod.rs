@@ -12,6 +12,7 @@ mod field;
 mod fit_error;
 mod fitted;
 mod inverse;
+mod learnt_area;
 mod likelihood;
 mod methods;
 mod parts;

@@ -35,7 +35,7 @@ impl Indentation {
 /// Errors of a quantity in its unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quantity {
-    /// At the scored presses.
+    /// At the scored presses within what was taught.
     pub scored: QuantityErrors,
     /// At the calibration presses, each by a model that has not seen its location.
     pub left_out: QuantityErrors,
@@ -43,6 +43,23 @@ pub struct Quantity {
     pub depths: Vec<QuantityAtDepth>,
     /// Calibration presses that taught.
     pub taught_by: u32,
+    /// Smallest and largest measurement that they taught.
+    pub taught: [f64; 2],
+    /// Scored presses that are left out: measured more than [`Quantity::EDGE`] beyond those.
+    pub beyond: u32,
+}
+
+impl Quantity {
+    /// Share of the smallest and of the largest taught measurement by which a scored press may be beyond it: depths of equal
+    /// presses scatter. Our choice.
+    pub const EDGE: f64 = 0.1;
+
+    /// True if presses of these measurements teach what this one is.
+    #[must_use]
+    pub fn teaches(taught: [f64; 2], measured: f64) -> bool {
+        let [least, most] = taught;
+        (least * (1.0 - Self::EDGE)..=most * (1.0 + Self::EDGE)).contains(&measured)
+    }
 }
 
 /// Errors of a quantity in its unit.
@@ -136,6 +153,6 @@ pub struct PressIndentation {
 pub struct Ranged {
     /// Value.
     pub value: f64,
-    /// Ends of the interval; `None` if too few calibration presses determine it.
+    /// Ends of the interval; `None` if too few calibration presses determine it, or if the value is beyond what they taught.
     pub interval: Option<[f64; 2]>,
 }

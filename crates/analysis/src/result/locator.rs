@@ -1,7 +1,7 @@
 //! Owns the result of learning to locate: the locator in use, its serialised form, its competitors, its regions.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::Locator;
+use skinrig_model::{Locator, Point2};
 
 use super::{Estimate, PairedTest};
 use crate::locator::FitError;
@@ -109,6 +109,18 @@ pub struct LocatorModel {
     /// Squared size of a region of each level, in units of the predicted covariance, from held-out calibration presses;
     /// empty if there are too few.
     pub levels: Vec<RegionLevel>,
+    /// Where the calibration presses are; `None` without any.
+    pub learnt: Option<LearntPlaces>,
+}
+
+/// Where a locator learnt. Estimates outside the convex hull, by more than the margin and their own region, are extrapolated and have no
+/// region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LearntPlaces {
+    /// Measured position of a calibration press of each location, mm.
+    pub places: Vec<Point2>,
+    /// Margin, mm: half of the largest distance of a place from its nearest other one. Our choice.
+    pub margin_mm: f64,
 }
 
 /// The column at which a camera sees a press at a position.

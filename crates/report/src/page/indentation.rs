@@ -7,6 +7,9 @@ use crate::figures;
 use crate::format::{interval, number};
 use crate::input::ReportInput;
 
+/// Share of the intervals of single estimates that hold, as stated.
+const STATED: f64 = 0.95;
+
 /// `None` unless the analysis estimates depths.
 pub(super) fn indentation(input: &ReportInput<'_>) -> Option<Section> {
     let a = input.analysis;
@@ -63,6 +66,11 @@ fn totals(found: &Indentation) -> Table {
         }
     }
     let taught = found.depth.as_ref().map_or(0, |q| q.taught_by);
+    for (name, quantity) in quantities {
+        for text in quantity.iter().filter_map(beyond) {
+            grid.note(format!("Of the {name}: {text}."));
+        }
+    }
     if found.depth.as_ref().is_some_and(has_no_intervals) {
         grid.note(
             "Single estimates have no 95 % intervals: fewer than 19 calibration presses are too few for one.".to_owned(),
@@ -134,6 +142,25 @@ fn has_no_intervals(depth: &Quantity) -> bool {
     depth.scored.covered.value.is_none() && depth.left_out.covered.value.is_none()
 }
 
+/// Scored presses without an error, if any.
+fn beyond(quantity: &Quantity) -> Option<String> {
+    let [least, most] = quantity.taught;
+    let all = quantity.scored.rmse.n + quantity.beyond;
+    (quantity.beyond > 0).then(|| {
+        format!(
+            "{} of {all} scored presses are left out, measured beyond the {least:.2} to {most:.2} that the calibration presses taught",
+            quantity.beyond
+        )
+    })
+}
+
+/// Share of the intervals at scored presses that hold, if it is certainly smaller than stated.
+fn too_few_hold(depth: &Quantity) -> Option<String> {
+    let share = depth.scored.covered.value?;
+    let most = depth.scored.covered.high?;
+    (most < STATED).then(|| format!("; intervals hold for {:.0} %", 100.0 * share))
+}
+
 /// One line for the terminal; `None` without depths.
 pub(crate) fn line(a: &Analysis) -> Option<String> {
     let found = a.indentation.as_ref()?;
@@ -143,12 +170,18 @@ pub(crate) fn line(a: &Analysis) -> Option<String> {
         (None, None) => return None,
     };
     let mut text = format!(
-        "RMSE {} mm {}, n {} presses, {} mm at left-out locations",
+        "RMSE {} mm {}, n {} presses{}, {} mm at left-out locations",
         number(depth.scored.rmse.value, 2),
         interval(&depth.scored.rmse, 1.0, 2),
         depth.scored.rmse.n,
+        match (depth.beyond, depth.taught) {
+            (0, _) => String::new(),
+            (n, [least, most]) =>
+                format!(" ({n} more beyond the {least:.1} to {most:.1} mm taught)"),
+        },
         number(depth.left_out.rmse.value, 2),
     );
+    text.extend(too_few_hold(depth));
     if has_no_intervals(depth) {
         text += "; no intervals: too few calibration presses";
     }

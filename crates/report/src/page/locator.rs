@@ -103,7 +103,7 @@ pub(super) fn reliability(a: &Analysis) -> Option<Table> {
     grid.note(format!(
         "A region is an ellipse about an estimate that holds the true position with the stated probability; its size comes \
          from calibration presses at left-out locations. Median area of the 95 % regions: {} mm². {beyond} presses lie \
-         beyond the calibration presses, where a field fades to the geometry and regions widen.",
+         beyond the calibration presses by more than half a step: nothing says how far off they are, and they have no region.",
         number(areas.get(areas.len() / 2).copied(), 1),
     ));
     grid.download("reliability");

@@ -47,6 +47,8 @@ fn with_depths(drifts: bool) -> Analysis {
             left_out: errors,
         }],
         taught_by: 16,
+        taught: [1.0, 2.0],
+        beyond: 0,
     };
     analysis.indentation = Some(Indentation {
         depth: Some(depth),
@@ -83,6 +85,31 @@ fn depths_have_a_section_a_figure_and_a_line() {
     assert!(text.contains("0.12 mm") && text.contains("drift"), "{text}");
     let still = html(&input(&with_depths(false)));
     assert!(still.contains("The skin returns to zero."));
+}
+
+/// Presses beyond what the calibration presses taught have no error, and intervals that do not hold are said to.
+#[test]
+fn what_was_not_taught_and_does_not_hold_is_said() {
+    let mut analysis = with_depths(false);
+    let depth = |a: &mut Analysis, change: fn(&mut Quantity)| {
+        change(a.indentation.as_mut().unwrap().depth.as_mut().unwrap());
+    };
+    let text = |a: &Analysis| terminal_summary(&input(a), false).replace('\n', " ");
+    assert!(!text(&analysis).contains("taught"));
+    assert!(!text(&analysis).contains("intervals hold"));
+    depth(&mut analysis, |depth| {
+        depth.beyond = 8;
+        depth.scored.covered = support::studies::estimate(0.5, 0.1, 32);
+    });
+    let shown: String = text(&analysis)
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ");
+    let expected = "n 32 presses (8 more beyond the 1.0 to 2.0 mm taught), 0.12 mm at left-out locations; intervals hold for 50 %";
+    assert!(shown.contains(expected), "{shown}");
+    assert!(
+        html(&input(&analysis)).contains("Of the depth (mm): 8 of 40 scored presses are left out")
+    );
 }
 
 #[test]

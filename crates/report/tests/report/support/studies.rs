@@ -489,6 +489,7 @@ pub(crate) fn locator() -> LocatorResult {
             prior: None,
             inflation: 1.0,
             levels: Vec::new(),
+            learnt: None,
         },
         reliability: [0.5, 0.8, 0.95]
             .map(|level| ReliabilityRow {
