@@ -106,18 +106,30 @@ pub(super) fn facts(
     })
 }
 
-/// The protocol by key. A protocol that no longer parses (a schedule, or a file is missing) is reduced to its name and the
-/// digest of its plan.
+/// The protocol by key. Without its files (positions of a path) it is reduced to its name and the digest of its plan; so is the
+/// schedule of an import, whose plan only lists the presses.
 fn protocol(header: &RunHeader) -> Value {
     let no_file = |p: &Path| Err(std::io::Error::other(p.display().to_string()));
     let text = header.protocol_text.as_bytes();
-    let read = Protocol::parse(&header.protocol_name, text, &header.overrides, &no_file);
+    let read = Protocol::parse_recorded(&header.protocol_name, text, &header.overrides, &no_file);
     let Ok(read) = read else {
-        return serde_json::json!({ "name": header.protocol_name, "plan": header.plan_sha256 });
+        let digest = match Origin::of(header) {
+            Some(Origin::Imported) => "plan",
+            _ => "unread_plan",
+        };
+        return serde_json::json!({ "name": header.protocol_name, digest: header.plan_sha256 });
     };
-    let mut value = serde_json::to_value(&read).unwrap_or(Value::Null);
+    settings(&read)
+}
+
+fn settings(read: &Protocol) -> Value {
+    let mut value = serde_json::to_value(read).unwrap_or(Value::Null);
     let hold_ms = read.motion.hold.0 as f64 / 1e6;
     value["motion"]["hold"] = Value::from(format!("{hold_ms} ms"));
+    value["order"] = Value::from(match read.shuffle_seed {
+        Some(_) => "shuffled",
+        None => "as listed",
+    });
     if let Some(map) = value.as_object_mut() {
         IGNORED_KEYS.iter().for_each(|key| {
             map.remove(*key);
@@ -128,4 +140,41 @@ fn protocol(header: &RunHeader) -> Value {
         }
     }
     value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinrig_compare::RULES;
+
+    /// Whoever adds a key decides whether it may cause the difference of two skins.
+    #[test]
+    fn each_key_of_a_protocol_has_a_rule_of_its_own() {
+        let text = include_bytes!("../../tests/fixtures/small.yaml");
+        let no_file = |p: &Path| Err(std::io::Error::other(p.display().to_string()));
+        let read = Protocol::parse_recorded("small.yaml", text, &[], &no_file).unwrap();
+        let mut keys: BTreeSet<String> = settings(&read)
+            .as_object()
+            .unwrap()
+            .keys()
+            .cloned()
+            .collect();
+        assert!(
+            keys.contains("motion") && keys.contains("order") && keys.len() > 15,
+            "{keys:?}"
+        );
+        // Left out where they are not set.
+        keys.extend(["calibrate_at", "stop", "online", "faults"].map(str::to_owned));
+        // Parts with different rules: each part has one.
+        keys.remove("prototype");
+        keys.remove("surroundings");
+        for key in keys {
+            let path = format!("protocol.{key}");
+            let rule = RULES.iter().find(|rule| path.starts_with(rule.prefix));
+            assert!(
+                rule.is_some_and(|rule| rule.prefix != "protocol."),
+                "{path}"
+            );
+        }
+    }
 }

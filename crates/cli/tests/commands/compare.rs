@@ -408,3 +408,50 @@ fn invalid_arguments_are_refused_with_help() {
         skinrig(&all).code(2).expect_stderr(&parts);
     }
 }
+
+/// A calibration from fewer presses is worse, which is not the skin's fault.
+#[test]
+fn sides_that_other_presses_calibrate_are_confounded() {
+    let lab = Lab::new();
+    let run = |folder: &str, seed: &str, more: &[&str]| {
+        let sessions = lab.text(folder);
+        let mut arguments = vec!["run", "protocols/comparison.yaml", "--sessions", &sessions];
+        arguments.extend(["--seed", seed, "--level", "geometric"]);
+        for size in ["columns=3", "rows=3", "pitch=20 mm"] {
+            arguments.extend(["--set", ["path.meander.", size].concat().leak()]);
+        }
+        arguments.extend([
+            "--set",
+            "repetitions.count=2",
+            "--set",
+            "evaluation.score=[2]",
+        ]);
+        arguments.extend_from_slice(more);
+        skinrig(&arguments).code(0);
+        text(&only(&lab.path(folder), ".session.sqlite"))
+    };
+    let all = run("all", "1", &[]);
+    let few = run("few", "2", &["--set", "calibrate_at.locations=5"]);
+    let again = run("again", "3", &[]);
+    let differences = |b: &str| {
+        let compared = skinrig(&["--json", "compare", &all, b, "--margin", "rmse=8 mm"]);
+        let differences = compared.json()["differences"].clone();
+        let all = differences.as_array().unwrap().clone();
+        let calibrate = all
+            .into_iter()
+            .filter(|d| d["what"] == "presses that calibrate");
+        calibrate.collect::<Vec<_>>()
+    };
+    assert_eq!(differences(&again), Vec::<Value>::new());
+    let found = differences(&few);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(
+        (&found[0]["weight"], &found[0]["key"]),
+        (&Value::from("confounding"), &Value::from("evaluation"))
+    );
+    let values = [
+        "9 at 9 locations, those of 100 % of the scored presses",
+        "5 at 5 locations, those of 56 % of the scored presses",
+    ];
+    assert_eq!(found[0]["values"], serde_json::json!(values));
+}

@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use skinrig_analysis::result::{AlignmentStatus, LEAST_LOCATED};
 use skinrig_model::{Reaction, Verdict};
 
-use super::camera_checks::{ambient, cameras};
+use super::calibration_checks::calibrating;
+use super::camera_checks::{ambient, cameras, ray_geometry};
 use super::difference::{Difference, Severity, as_blocking, difference};
 use super::share_checks::shares;
 use crate::locations::Locations;
@@ -20,6 +21,7 @@ pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference
     found.extend(check_prototypes(subjects));
     found.extend(check_planted(subjects));
     found.extend(check_stopped(subjects));
+    found.extend(calibrating(subjects));
     found.extend(check_locations(subjects, locations));
     found.extend(check_duplicates(subjects));
     found.extend(check_seeds(subjects));
@@ -27,6 +29,7 @@ pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference
     found.extend(check_plausible(subjects));
     found.extend(ambient(subjects, locations));
     found.extend(cameras(subjects));
+    found.extend(ray_geometry(subjects, locations));
     found
 }
 
@@ -212,7 +215,7 @@ fn check_stopped(subjects: &[Subject]) -> Option<Difference> {
         let depths = &reactions.depth_mm;
         let scored =
             s.analysis.presses.iter().filter(|p| {
-                p.role == skinrig_model::PressRole::Score && p.verdict == Verdict::Valid
+                p.role == skinrig_model::PressRole::Score && p.verdict != Verdict::Missed
             });
         let stops = reactions.reaction == Reaction::Stop;
         stops.then_some((depths.n, scored.count(), depths.median?))

@@ -16,6 +16,7 @@ const FACTS: &[(&str, &str)] = &[
     ("calibration.lens", "calibrated lens"),
     ("locator.used", "locator"),
     ("protocol.path_kind", "protocol: kind of path"),
+    ("protocol.order", "protocol: order of the presses"),
     ("protocol.shuffle_seed", "protocol: seed of the order"),
     ("protocol.roles", "protocol: role of each repetition"),
     ("simulation.seed", "simulation: seed"),

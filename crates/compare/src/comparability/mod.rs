@@ -4,6 +4,7 @@
 //! result), or blocking (no comparison unless overridden by key). `rules` classifies single facts; `checks` covers what
 //! needs more than one fact.
 
+mod calibration_checks;
 mod camera_checks;
 mod checks;
 mod difference;

@@ -47,9 +47,27 @@ const fn blocking(
     }
 }
 
+/// A key of the protocol that does not affect the compared presses.
+const fn harmless(prefix: &'static str, reason: &'static str) -> Rule {
+    rule(prefix, "protocol", Harmless, reason)
+}
+
+/// A part of the simulated cameras.
+const fn camera(prefix: &'static str) -> Rule {
+    rule(
+        prefix,
+        "simulated-cameras",
+        Confounding,
+        "the simulated cameras differ, not the skin",
+    )
+}
+
 const SAME_RIG: &str = "compare sessions from the same kind of rig";
 const SAME_TIP: &str = "press both skins with the same tip";
 const NO_FAULT: &str = "record without --fault";
+const PRESS_BY_PRESS: &str = "presses are compared one by one";
+const CLOCKS: &str = "alignment and certificate of the clocks are compared";
+const ENDS: &str = "ends a run, and does not change a press";
 
 /// All rules, in order of precedence. `docs/reference/comparison.md` documents them.
 pub const RULES: &[Rule] = &[
@@ -133,10 +151,56 @@ pub const RULES: &[Rule] = &[
         "presses that react to being felt hold shorter, or are less deep",
     ),
     rule(
+        "protocol.order",
+        "order",
+        Confounding,
+        "in another order, relaxation and drift meet other locations",
+    ),
+    rule(
+        "protocol.pause_between",
+        "pauses",
+        Confounding,
+        "in longer pauses the skin recovers further",
+    ),
+    rule(
+        "protocol.stop",
+        "stop",
+        Confounding,
+        "a campaign that ends once its error is low enough looks better",
+    ),
+    harmless("protocol.name", "a name"),
+    harmless("protocol.plan", PRESS_BY_PRESS),
+    harmless("protocol.path_kind", PRESS_BY_PRESS),
+    harmless("protocol.seed", PRESS_BY_PRESS),
+    harmless("protocol.shuffle_seed", PRESS_BY_PRESS),
+    harmless("protocol.calibrate_at", PRESS_BY_PRESS),
+    harmless(
+        "protocol.return_to_start",
+        "a motion between repetitions, off the skin",
+    ),
+    harmless("protocol.sync", CLOCKS),
+    harmless("protocol.marks", CLOCKS),
+    harmless(
+        "protocol.surroundings.keep_outs",
+        "where the tip may not go",
+    ),
+    harmless("protocol.limits", ENDS),
+    harmless("protocol.max_consecutive_invalid", ENDS),
+    harmless("protocol.surface_check", ENDS),
+    harmless("protocol.suspend", "a suspended press is made again"),
+    harmless(
+        "protocol.retakes",
+        "presses are made again when their data are lost, whatever the skin",
+    ),
+    harmless(
+        "protocol.online",
+        "the analysis does not use what was felt while recording",
+    ),
+    rule(
         "protocol.",
         "protocol",
-        Harmless,
-        "does not affect the compared presses",
+        Confounding,
+        "may affect the compared presses",
     ),
     rule(
         "bias.",
@@ -178,7 +242,37 @@ pub const RULES: &[Rule] = &[
         "simulation.true_cameras",
         "camera-locations",
         Harmless,
-        "each session's own calibration absorbs it",
+        "each session's own calibration absorbs it; `camera-geometry` compares the angles of the rays",
+    ),
+    camera("simulation.optical.uneven_pixels"),
+    camera("simulation.optical.uneven_noise"),
+    camera("simulation.optical.dark_latency"),
+    camera("simulation.optical.readout"),
+    camera("simulation.optical.threshold"),
+    camera("simulation.optical.latency_us"),
+    camera("simulation.optical.refractory_us"),
+    camera("simulation.optical.shot_hz"),
+    camera("simulation.optical.leak_hz"),
+    camera("simulation.optical.hot_"),
+    camera("simulation.geometric.background_hz"),
+    camera("simulation.geometric.hot"),
+    rule(
+        "simulation.camera_clock",
+        "simulated-clocks",
+        Harmless,
+        CLOCKS,
+    ),
+    rule(
+        "simulation.trigger_box",
+        "simulated-clocks",
+        Harmless,
+        CLOCKS,
+    ),
+    rule(
+        "simulation.drawn_cameras",
+        "camera-locations",
+        Harmless,
+        "`camera-geometry` compares where the cameras stood",
     ),
     rule(
         "simulation.",
@@ -264,7 +358,7 @@ pub const RULES: &[Rule] = &[
         "locator.used",
         "locator",
         Confounding,
-        "the skins were judged by different locators; set `analysis.locator` to one of them for both",
+        "the skins were judged by different locators; `analysis.locator: geometry` needs the fewest presses and judges both alike",
     ),
     rule(
         "software.recorded",
