@@ -7,6 +7,7 @@ use skinrig_model::{DeviceIdentity, DeviceRole, RigidTransform, RunHeader, Setti
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use tokio::runtime::Runtime;
 
+use crate::digest::{digest_table, sealed_tables};
 use crate::error::RecorderError;
 use crate::from_row::{header_from, planned_from};
 use crate::open;
@@ -128,6 +129,7 @@ impl SessionReader {
 
     /// Text fields of the header, without protocol, plan and presses.
     pub(crate) fn header_texts(&self) -> Result<HeaderTexts, RecorderError> {
+        self.check_header_seal()?;
         let sql =
             "SELECT session_id, started_at, prototype, operator, protocol_name, rig_kind, rig_name
                    FROM session";
@@ -149,8 +151,9 @@ impl SessionReader {
     /// Identity of the session.
     ///
     /// # Errors
-    /// If the file is damaged or its header is not yet written.
+    /// If the file is damaged or its header is not yet written; [`RecorderError::Changed`] if it is not the sealed one.
     pub fn headline(&self) -> Result<Headline, RecorderError> {
+        self.check_header_seal()?;
         let sql = "SELECT session_id, started_at, prototype, protocol_name, protocol_sha256, plan_sha256, overrides_json, seed,
                           rig_kind, rig_name
                    FROM session";
@@ -184,11 +187,36 @@ impl SessionReader {
         }
     }
 
+    /// Compares the header of a sealed session with its seal: lists show it without reading the rest.
+    fn check_header_seal(&self) -> Result<(), RecorderError> {
+        const TABLE: &str = "session";
+        let is_sealed = self.query("checking the seal", async |conn| {
+            let sealed = sealed_tables(conn).await?;
+            let Some(sealed) = sealed.into_iter().find(|table| table.name == TABLE) else {
+                return Ok(true);
+            };
+            Ok(digest_table(conn, TABLE, |_| {}).await? == Some(sealed))
+        })?;
+        if is_sealed {
+            return Ok(());
+        }
+        Err(RecorderError::Changed {
+            path: self.path.clone(),
+            tables: vec![TABLE.to_owned()],
+        })
+    }
+
     /// The run's header, including the planned presses.
     ///
     /// # Errors
-    /// If the file is damaged or its header is not yet written.
+    /// If the file is damaged or its header is not yet written; [`RecorderError::Changed`] if it is not the sealed one.
     pub fn header(&self) -> Result<RunHeader, RecorderError> {
+        self.check_header_seal()?;
+        self.header_as_it_is()
+    }
+
+    /// The run's header, whether or not it is the sealed one.
+    pub(crate) fn header_as_it_is(&self) -> Result<RunHeader, RecorderError> {
         const DOING: &str = "reading its header";
         // A session that begins gets all these rows at once: whoever reads this one finds the others.
         let mut header = self

@@ -175,6 +175,34 @@ fn changed_rows_of_a_sealed_session_are_refused() {
     );
 }
 
+/// Lists read the header of a sealed session alone.
+#[test]
+fn a_header_that_is_not_the_sealed_one_is_not_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    sealed(&path, 4);
+    let whole = SessionReader::open(&path).unwrap();
+    whole.header().unwrap();
+    whole.headline().unwrap();
+    writable(&path);
+    change(
+        &path,
+        &["UPDATE session SET prototype = 'mold 9', rig_kind = 'bench'"],
+    );
+    let reader = SessionReader::open(&path).unwrap();
+    for read in [reader.header().map(|_| ()), reader.headline().map(|_| ())] {
+        match read {
+            Err(RecorderError::Changed { tables, .. }) => assert_eq!(tables, ["session"]),
+            other => panic!("{other:?}"),
+        }
+    }
+    let problems = verify::<Evt2>(&path).unwrap().problems;
+    assert!(
+        problems.iter().any(|p| p.place.contains("session")),
+        "{problems:?}"
+    );
+}
+
 #[test]
 fn planned_presses_match_the_plan_even_without_a_seal() {
     let verify_with = |move_mm: f64| {
