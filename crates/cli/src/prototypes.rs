@@ -11,6 +11,7 @@ use skinrig_text::{Blocks, Column, Table, sparkline};
 
 use crate::args::PrototypesArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::{file_name, shell_word};
 use crate::sessions::{copies, originals};
 use crate::shelf::{Shelf, ShelfResult};
 
@@ -76,6 +77,9 @@ pub(crate) fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
             crate::sessions::of_prototype(&args.folder, prototype_id)?;
         }
     }
+    if args.prototype.is_none() {
+        name_without(&entries, &args.folder);
+    }
     let all = group(entries);
     if json {
         crate::terminal::print_json(&serde_json::to_value(&all).map_err(Failure::internal)?);
@@ -102,7 +106,30 @@ fn entries(folder: &Path, analysis: Option<&str>) -> Result<Vec<Entry>, Failure>
     for copy in copies(&shelf.sessions) {
         errln!("note: {copy}");
     }
+    for session in &shelf.sessions {
+        if let SessionState::Broken { reason } = &session.state {
+            errln!("note: left out: {reason}");
+        }
+    }
     Ok(read(&shelf, analysis))
+}
+
+/// Says which sessions are in no RMSE, and why the first of them is not.
+fn name_without(entries: &[Entry], folder: &Path) {
+    let mut without = entries
+        .iter()
+        .filter_map(|e| Some((e, e.point.without.as_ref()?)));
+    let Some((first, why)) = without.next() else {
+        return;
+    };
+    errln!(
+        "note: {} of {} sessions are in no RMSE, the first: {}: {why}\n  next: skinrig prototypes {} --prototype {}",
+        1 + without.count(),
+        entries.len(),
+        file_name(&first.point.session),
+        shell_word(&folder.display().to_string()),
+        shell_word(&first.prototype)
+    );
 }
 
 /// RMSE of an analysis, or why it has none that can be used.

@@ -9,6 +9,8 @@ use skinrig_nightly::trend::{Alarm, Report};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::trend::Links;
 
+use crate::paths::shell_word;
+
 /// Why the session of an alarm is missing.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum MissingEvidence {
@@ -103,7 +105,7 @@ impl AlarmEvidence {
     pub(super) fn links(&self, folder: Option<&Path>) -> Links {
         let session = self.session.as_ref().ok();
         let commands = session.map_or_else(Vec::new, |path| {
-            let path = quoted(path);
+            let path = shell_word(&path.display().to_string());
             vec![
                 format!("skinrig run --replay {path}"),
                 format!("skinrig verify {path}"),
@@ -116,17 +118,6 @@ impl AlarmEvidence {
             commands,
             missing: self.session.as_ref().err().map(ToString::to_string),
         }
-    }
-}
-
-/// Quotes a path for a shell.
-fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:+".contains(c);
-    if text.chars().all(plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
     }
 }
 

@@ -81,7 +81,27 @@ fn judge_history(args: &HilTrendArgs) -> Result<(History, Report), Failure> {
     };
     let history = history::load(&args.history, &filter).map_err(Failure::input)?;
     let report = judge(&history);
+    name_others(args)?;
     Ok((history, report))
+}
+
+/// Says which nights are judged, and which are not, if several suites and benches match the arguments.
+fn name_others(args: &HilTrendArgs) -> Result<(), Failure> {
+    let suites = history::suites(&args.history).map_err(Failure::input)?;
+    let wanted = |asked: &Option<String>, name: &String| asked.as_ref().is_none_or(|a| a == name);
+    let matching = suites
+        .iter()
+        .filter(|s| wanted(&args.rig, &s.rig) && wanted(&args.suite, &s.suite));
+    let each: Vec<String> = matching
+        .map(|s| format!("{} on {} ({} nights)", s.suite, s.rig, s.nights))
+        .collect();
+    if let Some((judged, others @ [_, ..])) = each.split_first() {
+        errln!(
+            "note: judged {judged}; not judged: {}\n  next: --rig NAME, --suite NAME",
+            others.join(", ")
+        );
+    }
+    Ok(())
 }
 
 /// Adds the nights in the folders of `nights` to the history.
