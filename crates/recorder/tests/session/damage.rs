@@ -175,7 +175,7 @@ fn changed_rows_of_a_sealed_session_are_refused() {
     );
 }
 
-/// Lists read the header of a sealed session alone.
+/// Some commands read the header of a sealed session alone.
 #[test]
 fn a_header_that_is_not_the_sealed_one_is_not_shown() {
     let folder = tempfile::tempdir().unwrap();
