@@ -8,7 +8,7 @@ use skinrig_text::{Column as Cells, Paint, Style};
 
 pub use crate::choices::label;
 use crate::choices::short;
-use crate::document::{self, Block, Column, Document, Group, Section, Table, Text, lines};
+use crate::document::{self, Block, Column, Document, Group, Note, Section, Table, Text, lines};
 use crate::figures::tradeoff as figure;
 use crate::format::{interval, number};
 
@@ -184,6 +184,19 @@ pub fn protocol_lines(row: &Row) -> String {
     out
 }
 
+fn interrupted(result: &Tradeoff) -> Option<Note> {
+    result.is_interrupted.then(|| {
+        let text = format!(
+            "{} of {} choices were tried: others may be better.",
+            result.rows.len(),
+            result.predictions.combinations
+        );
+        Note::new("INTERRUPTED.", text)
+            .warning()
+            .test_id("interrupted")
+    })
+}
+
 /// A self-contained page with the figure and a table of all rows. `rig` describes the origin of the session.
 #[must_use]
 pub fn page(result: &Tradeoff, session: &str, rig: &str) -> String {
@@ -202,7 +215,9 @@ pub fn page(result: &Tradeoff, session: &str, rig: &str) -> String {
         subheads: vec![Text::from(format!("session {session}")), rig.into()],
         skip: ("#choices", "Skip to the table"),
         sections: vec![
-            Section::new("fronts", "Fronts").with(figure),
+            Section::new("fronts", "Fronts")
+                .with_all(interrupted(result))
+                .with(figure),
             choices.with(Group::card().with(table(result, rows))),
         ],
         about: format!("Session {session}."),

@@ -45,18 +45,17 @@ pub struct Quantity {
     pub taught_by: u32,
     /// Smallest and largest measurement that they taught.
     pub taught: [f64; 2],
-    /// Scored presses that are left out: measured more than [`Quantity::EDGE`] beyond those.
+    /// Scored presses that are left out: measured more than a tenth beyond those.
     pub beyond: u32,
 }
 
 impl Quantity {
     /// Share of the smallest and of the largest taught measurement by which a scored press may be beyond it: depths of equal
     /// presses scatter. Our choice.
-    pub const EDGE: f64 = 0.1;
+    const EDGE: f64 = 0.1;
 
     /// True if presses of these measurements teach what this one is.
-    #[must_use]
-    pub fn teaches(taught: [f64; 2], measured: f64) -> bool {
+    pub(crate) fn teaches(taught: [f64; 2], measured: f64) -> bool {
         let [least, most] = taught;
         (least * (1.0 - Self::EDGE)..=most * (1.0 + Self::EDGE)).contains(&measured)
     }

@@ -169,18 +169,24 @@ pub(crate) fn line(a: &Analysis) -> Option<String> {
         (None, Some(why)) => return Some(format!("not estimated: {why}")),
         (None, None) => return None,
     };
-    let mut text = format!(
-        "RMSE {} mm {}, n {} presses{}, {} mm at left-out locations",
-        number(depth.scored.rmse.value, 2),
-        interval(&depth.scored.rmse, 1.0, 2),
-        depth.scored.rmse.n,
-        match (depth.beyond, depth.taught) {
-            (0, _) => String::new(),
-            (n, [least, most]) =>
-                format!(" ({n} more beyond the {least:.1} to {most:.1} mm taught)"),
-        },
-        number(depth.left_out.rmse.value, 2),
-    );
+    let [least, most] = depth.taught;
+    let beyond = format!("beyond the {least:.1} to {most:.1} mm taught");
+    let n = depth.scored.rmse.n;
+    let scored = match (n, depth.beyond) {
+        (0, 0) => "no scored press".to_owned(),
+        (0, all) => format!("all {all} scored presses {beyond}"),
+        _ => {
+            let rmse = number(depth.scored.rmse.value, 2);
+            let more = match depth.beyond {
+                0 => String::new(),
+                more => format!(" ({more} more {beyond})"),
+            };
+            let interval = interval(&depth.scored.rmse, 1.0, 2);
+            format!("RMSE {rmse} mm {interval}, n {n} presses{more}")
+        }
+    };
+    let left_out = number(depth.left_out.rmse.value, 2);
+    let mut text = format!("{scored}, {left_out} mm at left-out locations");
     text.extend(too_few_hold(depth));
     if has_no_intervals(depth) {
         text += "; no intervals: too few calibration presses";

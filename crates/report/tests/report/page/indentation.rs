@@ -94,22 +94,26 @@ fn what_was_not_taught_and_does_not_hold_is_said() {
     let depth = |a: &mut Analysis, change: fn(&mut Quantity)| {
         change(a.indentation.as_mut().unwrap().depth.as_mut().unwrap());
     };
-    let text = |a: &Analysis| terminal_summary(&input(a), false).replace('\n', " ");
+    let text = |a: &Analysis| -> String {
+        let shown = terminal_summary(&input(a), false);
+        shown.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
     assert!(!text(&analysis).contains("taught"));
     assert!(!text(&analysis).contains("intervals hold"));
     depth(&mut analysis, |depth| {
         depth.beyond = 8;
         depth.scored.covered = support::studies::estimate(0.5, 0.1, 32);
     });
-    let shown: String = text(&analysis)
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ");
+    let shown = text(&analysis);
     let expected = "n 32 presses (8 more beyond the 1.0 to 2.0 mm taught), 0.12 mm at left-out locations; intervals hold for 50 %";
     assert!(shown.contains(expected), "{shown}");
-    assert!(
-        html(&input(&analysis)).contains("Of the depth (mm): 8 of 40 scored presses are left out")
-    );
+    let page = html(&input(&analysis));
+    assert!(page.contains("Of the depth (mm): 8 of 40 scored presses are left out"));
+    depth(&mut analysis, |depth| depth.scored.rmse.n = 0);
+    let none = text(&analysis);
+    let expected =
+        "all 8 scored presses beyond the 1.0 to 2.0 mm taught, 0.12 mm at left-out locations";
+    assert!(none.contains(expected), "{none}");
 }
 
 #[test]
