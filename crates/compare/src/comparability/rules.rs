@@ -120,6 +120,7 @@ pub const RULES: &[Rule] = &[
         Confounding,
         "speed and duration of presses change the events",
     ),
+    harmless("protocol.surface_check", ENDS),
     rule(
         "protocol.surface",
         "surface",
@@ -186,7 +187,6 @@ pub const RULES: &[Rule] = &[
     ),
     harmless("protocol.limits", ENDS),
     harmless("protocol.max_consecutive_invalid", ENDS),
-    harmless("protocol.surface_check", ENDS),
     harmless("protocol.suspend", "a suspended press is made again"),
     harmless(
         "protocol.retakes",
@@ -242,7 +242,7 @@ pub const RULES: &[Rule] = &[
         "simulation.true_cameras",
         "camera-locations",
         Harmless,
-        "each session's own calibration absorbs it; `camera-geometry` compares the angles of the rays",
+        "each session's own calibration absorbs it; ray angles are compared",
     ),
     camera("simulation.optical.uneven_pixels"),
     camera("simulation.optical.uneven_noise"),
@@ -272,7 +272,7 @@ pub const RULES: &[Rule] = &[
         "simulation.drawn_cameras",
         "camera-locations",
         Harmless,
-        "`camera-geometry` compares where the cameras stood",
+        "ray angles are compared",
     ),
     rule(
         "simulation.",
@@ -389,4 +389,24 @@ pub const RULES: &[Rule] = &[
 /// First rule that matches this path.
 pub(super) fn rule_of(path: &str) -> Option<&'static Rule> {
     RULES.iter().find(|r| path.starts_with(r.prefix))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::RULES;
+
+    #[test]
+    fn no_rule_hides_a_later_one() {
+        for (i, rule) in RULES.iter().enumerate() {
+            let earlier = RULES[..i]
+                .iter()
+                .find(|e| rule.prefix.starts_with(e.prefix));
+            assert!(
+                earlier.is_none(),
+                "{} hides {}",
+                earlier.unwrap().prefix,
+                rule.prefix
+            );
+        }
+    }
 }
