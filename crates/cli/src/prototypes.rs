@@ -357,6 +357,28 @@ mod tests {
     use super::*;
 
     #[test]
+    fn an_rmse_states_its_presses() {
+        let estimate = Estimate {
+            value: Some(2.345),
+            low: Some(2.0),
+            high: Some(3.0),
+            n: 27,
+        };
+        assert_eq!(interval(Some(estimate)), "2.35 (2.00 to 3.00), n 27");
+        let alone = Estimate {
+            low: None,
+            ..estimate
+        };
+        assert_eq!(interval(Some(alone)), "2.35, n 27");
+    }
+
+    /// The questions in `crates/catalogue/questions` repeat the least share as text.
+    #[test]
+    fn questions_have_the_same_least_share() {
+        assert_eq!(LEAST_LOCATED.to_string(), "0.5");
+    }
+
+    #[test]
     fn a_sparkline_spans_its_values() {
         assert_eq!(spark(&[1.0, 2.0, 3.0]), "▁▅█");
         assert_eq!(spark(&[2.0, 2.0]), "▅▅");

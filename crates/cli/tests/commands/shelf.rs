@@ -203,6 +203,9 @@ fn the_error_of_the_few_easy_presses_ranks_no_prototype() {
         "{without}"
     );
     assert!(with_catalogue["best"].is_null());
+    skinrig(&["prototypes", &lab.text("s")])
+        .code(0)
+        .expect_stderr(&["1 of 1 sessions are in no RMSE", "--prototype 'test skin'"]);
     std::fs::remove_file(lab.path("s/catalogue.sqlite")).unwrap();
     assert_eq!(series(), with_catalogue);
 }

@@ -253,6 +253,9 @@ fn ctrl_c_leaves_with_the_best_so_far() {
     let printed = String::from_utf8(output.stdout).unwrap();
     assert!(printed.starts_with("most accurate within"), "{printed}");
     assert!(printed.contains("n 6 that did not choose"), "{printed}");
+    let page = printed.lines().find_map(|l| l.strip_prefix("page     "));
+    let page = std::fs::read_to_string(page.unwrap()).unwrap();
+    assert!(page.contains("INTERRUPTED.") && page.contains(" of 6930 choices were tried"));
 }
 
 #[test]

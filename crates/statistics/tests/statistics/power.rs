@@ -158,6 +158,36 @@ fn a_required_design_decides() {
     }
 }
 
+/// The present number of repetitions did not decide: the advice is never to make as many.
+#[test]
+fn more_repetitions_are_more_than_there_are() {
+    let mut advised = 0;
+    for seed in 0..60 {
+        let mut draws = Draws::new(seed, 0);
+        let [a, b] = [0.0, 0.4].map(|mean| {
+            let presses = (0..10).flat_map(|location| [(location, mean); 2]);
+            let noisy = presses.map(|(at, mean)| (at, mean + draws.normal()));
+            Sample::mean(noisy.collect::<Vec<_>>()).unwrap()
+        });
+        let question = ComparisonTarget {
+            better: ImprovementDirection::Lower,
+            margin: None,
+        };
+        let found = compare(&a, &b, &question, &Settings::default()).unwrap();
+        let PressesNeeded::More(needed) = found.needed else {
+            continue;
+        };
+        let Some(repetitions) = needed.repetitions else {
+            continue;
+        };
+        advised += 1;
+        assert!(repetitions > 2, "{needed:?}");
+        let more = 10 * (repetitions - 2);
+        assert_eq!(needed.more_presses_by_repetitions, Some(more));
+    }
+    assert!(advised > 5, "{advised}");
+}
+
 /// If every press of both skins was located, the interval is too wide for the margin and no
 /// difference can be shown.
 #[test]
