@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use skinrig_recorder::RecorderError;
+use skinrig_recorder::{RecorderError, SESSION_SUFFIX};
 use tokio::runtime::Runtime;
 
 use crate::address::Address;
@@ -149,8 +149,13 @@ impl Catalogue {
     /// Registers these session files, whatever the catalogue has of them. A file that cannot be read is part of the result.
     ///
     /// # Errors
-    /// If a folder or the catalogue cannot be read or written.
+    /// [`CatalogueError::OtherName`] for a file that the next list of its folder would leave out. If a folder or the catalogue cannot be read or written.
     pub fn register(&mut self, sessions: &[PathBuf]) -> Result<Registration, CatalogueError> {
+        let is_unlisted = |path: &&PathBuf| !path.to_string_lossy().ends_with(SESSION_SUFFIX);
+        if let Some(path) = sessions.iter().find(is_unlisted) {
+            let path = path.to_owned();
+            return Err(CatalogueError::OtherName { path });
+        }
         let mut done = Registration::default();
         let folder_of = |path: &Path| path.parent().unwrap_or(Path::new("")).to_owned();
         let mut rest = sessions;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use skinrig_recorder::SESSION_SUFFIX;
 use skinrig_settings::Diagnostics;
 
 /// A catalogue could not be read or written.
@@ -17,6 +18,14 @@ pub enum CatalogueError {
         doing: &'static str,
         /// Error of the operating system.
         source: std::io::Error,
+    },
+    /// The file is not called like a session: lists of its folder do not find it.
+    #[error(
+        "{}: expected a name that ends with `{SESSION_SUFFIX}`, found another, which lists of its folder leave out; rename the file", path.display()
+    )]
+    OtherName {
+        /// The file.
+        path: PathBuf,
     },
     /// A query failed.
     #[error("{place}: {doing}: {source}")]

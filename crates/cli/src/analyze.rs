@@ -89,6 +89,8 @@ fn analyze_one(args: &AnalyzeArgs, target: &Target) -> Result<Written, Failure> 
         calibration_from: args.calibration_from.as_deref(),
         selection: target.selected.as_ref(),
     };
+    let own = analyses::results_path(&target.path, None);
+    crate::results::check_writable(args.out.as_ref().unwrap_or(&own))?;
     let results = analyze_shown(&target.path, choices)?;
     if let (Some(variant), Some(out)) = (&results.provenance.variant, &args.out) {
         let official = analyses::results_path(&target.path, None);

@@ -70,11 +70,12 @@ mod watch;
 mod whole_file;
 
 use std::ffi::OsString;
+use std::time::SystemTime;
 
 use clap::Parser;
 
 use crate::args::{Cli, Command};
-use crate::exit::{Exit, Outcome};
+use crate::exit::{Exit, Failure, Outcome};
 
 /// Parses a command line (the first word is the program's name) without running it.
 ///
@@ -101,7 +102,8 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
             return exit;
         }
     };
-    match dispatch(&cli, &arguments) {
+    let dated = dates_are_possible(SystemTime::now());
+    match dated.and_then(|()| dispatch(&cli, &arguments)) {
         Ok(_) if terminal::output_failed() => {
             errln!("error: cannot write to standard output: is the disk full?");
             Exit::Internal
@@ -111,6 +113,17 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
             errln!("{}", failure.message);
             failure.exit
         }
+    }
+}
+
+/// Rejects a clock before 1970: what is recorded, tagged or written has a date, which it cannot have then.
+fn dates_are_possible(now: SystemTime) -> Result<(), Failure> {
+    match now.duration_since(SystemTime::UNIX_EPOCH) {
+        Ok(_) => Ok(()),
+        Err(_) => Err(Failure::internal(
+            "expected a date after 1970 from the clock of this computer, found an earlier one\n  next: set the clock, for example with \
+             `timedatectl set-time`",
+        )),
     }
 }
 
@@ -177,4 +190,24 @@ fn command_line(arguments: &[OsString]) -> String {
         .map(|a| a.to_string_lossy())
         .collect();
     format!("skinrig {}", words.join(" "))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn a_clock_before_1970_is_refused() {
+        let epoch = SystemTime::UNIX_EPOCH;
+        assert!(dates_are_possible(epoch).is_ok());
+        let refused = dates_are_possible(epoch - Duration::from_nanos(1)).unwrap_err();
+        assert_eq!(refused.exit, Exit::Internal);
+        assert!(
+            refused.message.contains("set the clock"),
+            "{}",
+            refused.message
+        );
+    }
 }

@@ -196,14 +196,23 @@ pub(crate) fn write_named(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     whole_file::write_named(path, bytes).map_err(|e| unwritten(path, &e))
 }
 
+/// Tests that the results can be written at `path` before they are computed.
+///
+/// # Errors
+/// As [`write`].
+pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
+    whole_file::probe(path).map_err(|e| unwritten(path, &e))
+}
+
 fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
     let next = match error.kind() {
         std::io::ErrorKind::AlreadyExists => {
             let text = format!("{}: {error}\n  next: name another file", path.display());
             return Failure::input(text);
         }
-        std::io::ErrorKind::StorageFull => "free some space, or choose another path",
-        _ => "choose another path",
+        std::io::ErrorKind::StorageFull => "free some space",
+        std::io::ErrorKind::NotFound => "create its folder",
+        _ => "make its folder writable, or name another file where the command takes one (--out)",
     };
     Failure::internal(format!(
         "{}: cannot write: {error}\n  next: {next}",

@@ -22,7 +22,7 @@ use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::file_name;
 use crate::phase::Phase;
-use crate::results::{not_official, open, write, write_named};
+use crate::results::{check_writable, not_official, open, write, write_named};
 use crate::selection;
 use crate::signals::on_ctrl_c;
 use crate::terminal::Output;
@@ -262,6 +262,12 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     if let (Some(variant), Some(out)) = (&variant, &args.out) {
         not_official(&tradeoff_path(&target.path, None), out, variant)?;
     }
+    let variant_name = variant.as_ref().map(|v| v.name.as_str());
+    let html_path = match &args.out {
+        Some(out) => out.clone(),
+        None => tradeoff_path(&target.path, variant_name),
+    };
+    check_writable(&html_path)?;
     let identity = SessionIdentity::of(&aligned.session.reader).map_err(Failure::session)?;
     let mut rig = rig_in_words(&aligned.session.header);
     if let Some(variant) = &variant {
@@ -313,10 +319,6 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         })
     });
     document["answers"] = serde_json::Value::Array(found.collect());
-    let html_path = args
-        .out
-        .clone()
-        .unwrap_or_else(|| tradeoff_path(&target.path, variant.as_ref().map(|v| v.name.as_str())));
     let json_path = html_path.with_extension("json");
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
     let text = results_digest::with_digest(&text);

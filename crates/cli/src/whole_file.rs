@@ -28,6 +28,16 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     written
 }
 
+/// Tests that a file can be written at `path`, before work whose result it is to hold. Nothing at `path` changes.
+///
+/// # Errors
+/// The error of the system.
+pub(crate) fn probe(path: &Path) -> io::Result<()> {
+    let (partial, file) = create_partial(path)?;
+    drop(file);
+    fs::remove_file(partial)
+}
+
 /// Bytes at the start of a file by which its kind is told.
 const START_BYTES: u64 = 4096;
 
@@ -112,6 +122,19 @@ fn remove_leftovers(path: &Path) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_probe_leaves_the_file_as_it_is_and_names_what_is_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.json");
+        probe(&path).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        fs::write(&path, "there").unwrap();
+        probe(&path).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "there");
+        let missing = probe(&folder.path().join("none/x.json")).unwrap_err();
+        assert_eq!(missing.kind(), io::ErrorKind::NotFound);
+    }
 
     #[test]
     fn concurrent_writers_leave_one_complete_file() {

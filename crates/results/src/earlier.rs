@@ -13,6 +13,7 @@ use skinrig_recorder::{DeviceRow, RecorderError, SessionReader};
 use crate::earlier_mismatch::EarlierMismatch;
 use crate::error::ResultsError;
 use crate::events::SessionEvents;
+use crate::origin::Origin;
 use crate::rig_document::RigDocument;
 use crate::session::Session;
 use crate::settings::AnalysisOptions;
@@ -66,6 +67,16 @@ fn mismatch(this: &Session, earlier: &Session) -> Result<Option<EarlierMismatch>
     if this.reader.session_id()? == earlier.reader.session_id()? {
         return Ok(Some(EarlierMismatch::SameSession));
     }
+    let rigs = [earlier, this].map(rig);
+    if rigs[0] != rigs[1] {
+        let [earlier, this] = rigs;
+        return Ok(Some(EarlierMismatch::OtherRig { earlier, this }));
+    }
+    let faults = [earlier, this].map(planted_faults);
+    if faults[0] != faults[1] {
+        let [earlier, this] = faults;
+        return Ok(Some(EarlierMismatch::OtherFaults { earlier, this }));
+    }
     let skins = [earlier, this].map(|s| s.header.prototype.clone());
     if skins[0] != skins[1] {
         let [earlier, this] = skins;
@@ -108,6 +119,35 @@ fn mismatch(this: &Session, earlier: &Session) -> Result<Option<EarlierMismatch>
         }
     }
     Ok(None)
+}
+
+/// What recorded a session, in words: its origin and, of a simulation, its level. A replay counts as what it replays.
+fn rig(session: &Session) -> String {
+    let origin = Origin::of(&session.header);
+    let origin = origin.map_or("unknown", Origin::name);
+    match rig_value(session)["level"].as_str() {
+        Some(level) => format!("{origin}, level {level}"),
+        None => origin.to_owned(),
+    }
+}
+
+/// The planted faults of a simulation, as it describes them.
+fn planted_faults(session: &Session) -> String {
+    let rig = rig_value(session);
+    let faults = rig["faults"].as_array().into_iter().flatten();
+    let faults: Vec<String> = faults
+        .map(|f| f.as_str().unwrap_or("?").to_owned())
+        .collect();
+    if faults.is_empty() {
+        "none".to_owned()
+    } else {
+        faults.join(", ")
+    }
+}
+
+fn rig_value(session: &Session) -> serde_json::Value {
+    let document = serde_json::from_str::<RigDocument>(&session.header.rig_json);
+    document.map(|d| d.rig).unwrap_or_default()
 }
 
 /// A camera as recorded by the last leg; `None` if the session has none, as an import.
@@ -159,8 +199,7 @@ fn tips(session: &Session) -> BTreeMap<&'static str, String> {
     let protocol = Protocol::parse_recorded(name, text, &header.overrides, &no_file);
     let tip = protocol.ok().and_then(|p| p.prototype.tip);
     tips.extend(tip.map(|tip| ("prototype", format!("`{tip}`"))));
-    let rig = serde_json::from_str::<RigDocument>(&header.rig_json).ok();
-    let rig = rig.map(|r| r.rig).unwrap_or_default();
+    let rig = rig_value(session);
     let (shape, size) = (rig["tip"]["shape"].as_str(), rig["tip"]["size_mm"].as_f64());
     tips.extend(
         shape

@@ -18,6 +18,28 @@ pub enum EarlierMismatch {
         /// Share of the events of the smaller session that are in the other, percent.
         percent: f64,
     },
+    /// Another kind of rig recorded it, or another level of the simulation.
+    #[error(
+        "expected a session of the same rig ({this}), found {earlier}: its cameras see other events\n  next: take the calibration from a \
+         session of the same rig and level, or calibrate in full"
+    )]
+    OtherRig {
+        /// Rig of the earlier session.
+        earlier: String,
+        /// Rig of this one.
+        this: String,
+    },
+    /// A fault was planted in one of them, and not in the other.
+    #[error(
+        "expected the same planted faults as here ({this}), found {earlier}\n  next: take the calibration from a session with the same \
+         faults, or calibrate in full"
+    )]
+    OtherFaults {
+        /// Faults of the earlier session.
+        earlier: String,
+        /// Faults of this one.
+        this: String,
+    },
     /// Another skin was pressed.
     #[error(
         "expected the skin `{this}`, found `{earlier}`\n  next: take the calibration from a session of `{this}`, or calibrate in full"

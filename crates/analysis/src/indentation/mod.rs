@@ -236,13 +236,16 @@ fn zero(
 ) -> Option<ZeroReturn> {
     let observed = |s: &&SeenPress<'_>| s.phases.iter().all(|p| is_observed(p));
     let teaches: HashMap<PressId, ()> = set.sights().iter().map(|s| (s.press, ())).collect();
-    let habit: Vec<[&PressPhases; 2]> = seen
+    let habit: Vec<(f64, [&PressPhases; 2])> = seen
         .iter()
         .filter(observed)
         .filter(|s| teaches.contains_key(&presses[s.row].press))
-        .map(|s| s.phases)
+        .filter_map(|s| {
+            let at = rows.binary_search_by_key(&presses[s.row].press, |r| r.press);
+            Some((rows[at.ok()?].measured_mm?, s.phases))
+        })
         .collect();
-    let habit = Habit::new(&habit)?;
+    let habit = Habit::new(&habit);
     let mut rests = Vec::new();
     let mut after_s = f64::INFINITY;
     for s in seen.iter().filter(observed) {
@@ -250,7 +253,7 @@ fn zero(
         let Ok(at) = rows.binary_search_by_key(&press.press, |r| r.press) else {
             continue;
         };
-        let depth = rows[at].depth_mm.map(|d| d.value);
+        let depth = rows[at].measured_mm.or(rows[at].depth_mm.map(|d| d.value));
         rows[at].rest_mm = depth.and_then(|mm| habit.rest_mm(s.phases, mm));
         let scores = press.role == PressRole::Score && press.verdict == Verdict::Valid;
         let measured = rows[at].measured_mm;

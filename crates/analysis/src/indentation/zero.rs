@@ -1,8 +1,8 @@
 //! Owns the return to zero: what is left of the change by a press when the time after it ends.
 //!
 //! A pixel fires when its brightness has moved by a threshold, so that it returns to within a threshold, not to zero: on the
-//! way back it may keep an event. The share of such pixels is a property of the camera; the median over the calibration
-//! presses is subtracted.
+//! way back it may keep an event. How many do depends on the camera and on how deep the press was: the median over the
+//! calibration presses of about the same depth is subtracted.
 
 use skinrig_model::AnalysisSettings;
 
@@ -16,9 +16,21 @@ const NORMAL: f64 = 1.96;
 /// Shortest time after the release that says anything, s.
 const SHORTEST_S: f64 = 0.5;
 
-/// Events left per changed pixel, by camera; medians over calibration presses.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Habit([f64; 2]);
+/// Fewest calibration presses whose median is taken, if there are as many; a quarter of all, if that is more.
+const NEAREST: usize = 8;
+/// Presses whose depths differ by less than this share are of the same depth.
+const SAME_DEPTH: f64 = 0.11;
+/// Differences of distances in depth that are none, mm: presses at equal distances count together.
+const TIE_MM: f64 = 1e-6;
+
+/// A calibration press: its measured depth, mm, and by camera the events left per changed pixel, if any changed.
+struct Calibrating {
+    depth_mm: f64,
+    shares: [Option<f64>; 2],
+}
+
+/// Events left per changed pixel, by camera and depth: those of calibration presses.
+pub(super) struct Habit(Vec<Calibrating>);
 
 /// True if the time after the releases is long enough.
 pub(super) fn is_observed(press: &PressPhases) -> bool {
@@ -26,24 +38,43 @@ pub(super) fn is_observed(press: &PressPhases) -> bool {
 }
 
 impl Habit {
-    /// From calibration presses; `None` if none changed a pixel.
-    pub(super) fn new(presses: &[[&PressPhases; 2]]) -> Option<Self> {
-        let median = |k: usize| {
-            let each = presses.iter().map(|p| p[k].rest);
-            let mut shares: Vec<f64> = each
-                .filter(|r| r.pixels > 0)
-                .map(|r| r.toward as f64 / r.pixels as f64)
-                .collect();
-            shares.sort_unstable_by(f64::total_cmp);
-            shares.get(shares.len() / 2).copied()
+    /// From calibration presses with their measured depths, mm.
+    pub(super) fn new(presses: &[(f64, [&PressPhases; 2])]) -> Self {
+        let share = |camera: &PressPhases| {
+            let rest = camera.rest;
+            (rest.pixels > 0).then(|| rest.toward as f64 / rest.pixels as f64)
         };
-        Some(Self([median(0)?, median(1)?]))
+        let each = presses.iter().map(|(depth_mm, cameras)| Calibrating {
+            depth_mm: *depth_mm,
+            shares: cameras.map(share),
+        });
+        Self(each.collect())
     }
 
-    /// What is left of a press of this depth, mm, averaged over both cameras by their changes; `None` if no pixel changed.
+    /// Median of a camera over the calibration presses that are nearest in depth: all of the same depth, and at least so many.
+    fn share(&self, camera: usize, depth_mm: f64) -> Option<f64> {
+        let with_share = self.0.iter().filter_map(|press| {
+            let apart_mm = (press.depth_mm - depth_mm).abs();
+            Some((apart_mm, press.shares[camera]?))
+        });
+        let mut nearest: Vec<(f64, f64)> = with_share.collect();
+        nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let least = NEAREST.max(nearest.len() / 4);
+        let farthest_mm = nearest.get(least - 1).or(nearest.last())?.0;
+        let within_mm = (farthest_mm + TIE_MM).max(SAME_DEPTH * depth_mm.abs());
+        let near = nearest.partition_point(|n| n.0 < within_mm);
+        nearest.truncate(near);
+        let mut shares: Vec<f64> = nearest.iter().map(|n| n.1).collect();
+        shares.sort_unstable_by(f64::total_cmp);
+        shares.get(shares.len() / 2).copied()
+    }
+
+    /// What is left of a press of this depth, mm, averaged over both cameras by their changes; `None` if no pixel changed, in it or in
+    /// calibration presses.
     pub(super) fn rest_mm(&self, cameras: [&PressPhases; 2], depth_mm: f64) -> Option<f64> {
         let (mut left, mut size) = (0.0, 0.0);
-        for (camera, habit) in cameras.iter().zip(self.0) {
+        for (k, camera) in cameras.iter().enumerate() {
+            let habit = self.share(k, depth_mm)?;
             left += camera.rest.toward as f64 - habit * camera.rest.pixels as f64;
             size += camera.rest.size as f64;
         }
@@ -119,13 +150,26 @@ mod tests {
     #[test]
     fn what_every_press_keeps_is_no_rest() {
         let usual = camera(300, 1_000);
-        let habit = Habit::new(&[[&usual, &usual]; 3]).unwrap();
+        let habit = Habit::new(&[(2.0, [&usual, &usual]); 3]);
         assert_eq!(habit.rest_mm([&usual, &usual], 2.0), Some(0.0));
         // A tenth of the change by the press is left besides.
         let more = camera(300 + 500, 1_000);
         let rest = habit.rest_mm([&more, &more], 2.0).unwrap();
         assert!((rest - 0.2).abs() < 1e-12, "{rest}");
         assert_eq!(habit.rest_mm([&camera(0, 0), &camera(0, 0)], 2.0), None);
+    }
+
+    #[test]
+    fn deep_and_shallow_presses_keep_different_shares() {
+        let (shallow, deep) = (camera(500, 1_000), camera(200, 1_000));
+        let depths = (0..10).map(|i| 1.0 + 0.01 * f64::from(i));
+        let presses: Vec<_> = depths
+            .flat_map(|mm| [(mm, [&shallow, &shallow]), (mm + 1.5, [&deep, &deep])])
+            .collect();
+        let habit = Habit::new(&presses);
+        assert_eq!(habit.rest_mm([&shallow, &shallow], 1.05), Some(0.0));
+        assert_eq!(habit.rest_mm([&deep, &deep], 2.55), Some(0.0));
+        assert_eq!(Habit::new(&[]).rest_mm([&deep, &deep], 2.0), None);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use skinrig_model::{AnalysisSettings, CalibrationModel, Locator, SENSOR_WIDTH};
 
-use super::choice::{self, Choice};
+use super::choice::{self, Choice, Region};
 use super::plan::{Plan, Progress};
 use super::predict::{Predictions, predict};
 use super::replay::Replay;
@@ -51,7 +51,9 @@ impl Measuring<'_> {
         if self.is_stopped {
             return false;
         }
-        let crop = self.replay.region_rows(self.reading, choice.region);
+        let Some(crop) = self.replay.region_rows(self.reading, choice.region) else {
+            return false;
+        };
         let settings = choice.settings(self.session, crop, self.model, self.locator);
         let outcome = self.replay.run(&settings);
         let bits = bits_per_event(&settings);
@@ -103,10 +105,18 @@ impl Measuring<'_> {
         rmse_mm.is_some()
     }
 
+    /// The choices that the session can measure: without calibration presses nothing says which part of the rows to read.
+    fn possible(&self, choices: Vec<Choice>) -> impl Iterator<Item = Choice> + use<> {
+        let parts = self.replay.calibrates();
+        let mut choices = choices;
+        choices.retain(|c| parts || c.region == Region::Full);
+        choices.into_iter()
+    }
+
     /// Measures the choices of the plan. The curves and draws come first.
     pub(super) fn measure(&mut self) -> Predictions {
         let base = Choice::of(self.session);
-        let all = choice::all(base);
+        let all: Vec<Choice> = self.possible(choice::all(base)).collect();
         let combinations = all.len();
         if self.plan.full {
             all.into_iter().for_each(|choice| {
@@ -117,7 +127,7 @@ impl Measuring<'_> {
                 ..Predictions::default()
             };
         }
-        choice::curves(base).into_iter().for_each(|choice| {
+        self.possible(choice::curves(base)).for_each(|choice| {
             self.add(choice);
         });
         let curves = self.points.clone();
@@ -138,7 +148,7 @@ impl Measuring<'_> {
         }
         let best = self.best.map(|best| self.points[best].choice);
         for about in [Some(base), best].into_iter().flatten() {
-            for choice in choice::grids(about) {
+            for choice in self.possible(choice::grids(about)) {
                 if search::is_fresh(choice, &self.points) {
                     self.add(choice);
                 }

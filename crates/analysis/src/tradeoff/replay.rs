@@ -260,19 +260,24 @@ impl<'a> Replay<'a> {
         out
     }
 
+    /// Whether calibration presses were retained.
+    pub(crate) fn calibrates(&self) -> bool {
+        self.presses(PressRole::Calibrate).next().is_some()
+    }
+
     /// Rows of a region per camera: the adjacent ones with most of the events that the calibration presses add to the idle
-    /// rate; ties go to the first. The whole crop without calibration presses.
+    /// rate; ties go to the first. `None` for a part of them without calibration presses.
     pub(crate) fn region_rows(
         &self,
         settings: &AnalysisSettings,
         region: Region,
-    ) -> [(u16, u16); 2] {
+    ) -> Option<[(u16, u16); 2]> {
         let parts = match region {
-            Region::Full => return settings.crop_v,
+            Region::Full => return Some(settings.crop_v),
             Region::Half => 2,
             Region::Quarter => 4,
         };
-        CameraId::ALL.map(|camera| {
+        let rows_of = |camera: CameraId| {
             let (first, last) = settings.crop_v[camera.index()];
             let mut rows = vec![0.0; usize::from(last - first) + 1];
             let windows = self.windows_by_row(camera, settings);
@@ -303,11 +308,9 @@ impl<'a> Replay<'a> {
                     best = (sum, from);
                 }
             }
-            if self.presses(PressRole::Calibrate).next().is_none() {
-                return (first, last);
-            }
             (first + best.1 as u16, first + (best.1 + height) as u16 - 1)
-        })
+        };
+        self.calibrates().then(|| CameraId::ALL.map(rows_of))
     }
 }
 

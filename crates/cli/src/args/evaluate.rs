@@ -124,7 +124,7 @@ pub(crate) struct TradeoffArgs {
     pub target_rmse: Option<f64>,
 
     /// The cost that `--target-rmse` minimises.
-    #[arg(long, value_enum, default_value = "cpu")]
+    #[arg(long, value_enum, default_value = "cpu", requires = "target_rmse")]
     pub cost: CostKind,
 
     /// Recommend the most accurate choice within this CPU time per press, for example `100us`.

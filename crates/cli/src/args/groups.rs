@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use skinrig_text::{LongWords, Paint, hang};
@@ -66,11 +66,37 @@ where
     T: Into<std::ffi::OsString> + Clone,
 {
     let mut command = command();
-    let matches = command.try_get_matches_from_mut(words)?;
+    let words: Vec<std::ffi::OsString> = words.into_iter().map(Into::into).collect();
+    let parsed = command.try_get_matches_from_mut(&words);
+    let matches = parsed.map_err(|error| match unread_negative(&error, &words) {
+        Some(message) => command.error(ErrorKind::UnknownArgument, message),
+        None => error,
+    })?;
     if let Some(twice) = given_twice(&matches) {
         return Err(command.error(ErrorKind::ArgumentConflict, twice));
     }
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+}
+
+/// Says how to give a negative value to an option, if one was read as an unknown option; `None` for any other error.
+fn unread_negative(error: &clap::Error, words: &[std::ffi::OsString]) -> Option<String> {
+    let Some(ContextValue::String(unknown)) = error.get(ContextKind::InvalidArg) else {
+        return None;
+    };
+    let is_number = |word: &str| {
+        let mut rest = word.strip_prefix('-')?.chars();
+        let first = rest.next()?;
+        (first.is_ascii_digit() || first == '.').then_some(())
+    };
+    is_number(unknown)?;
+    let mut words = words.windows(2).filter_map(|pair| {
+        let (option, value) = (pair[0].to_str()?, pair[1].to_str()?);
+        (value.starts_with(unknown) && option.starts_with("--")).then_some((option, value))
+    });
+    let (option, value) = words.next_back()?;
+    Some(format!(
+        "expected an option, found `{value}`\n\n  tip: a value that starts with `-` follows `=`: `{option}={value}`"
+    ))
 }
 
 /// Says which value of a protocol is given twice and differently, by `--set` or by an option of its own; `None` if none is.

@@ -24,8 +24,11 @@ pub(super) enum ValueError {
     /// Not a number, or not from 0 to 1.
     #[error("expected a share from 0 to 1, found {found}")]
     Share { found: String },
-    /// Not a number, or not from 0 to 100.
-    #[error("expected a share from 0% to 100%, found {found}")]
+    /// Not a number, not from 0 to 100, or a fraction without its unit.
+    #[error(
+        "expected a share from 0% to 100%, found {found}{}",
+        fraction_tip(found)
+    )]
     Percent { found: String },
     /// Not a number, or not above 0.
     #[error("expected a number per second above 0, found {found}")]
@@ -189,9 +192,25 @@ pub(super) fn share(text: &str) -> Result<f64, ValueError> {
     }
 }
 
+/// What to write instead of a fraction without a unit.
+fn fraction_tip(found: &str) -> String {
+    match found.trim().parse::<f64>() {
+        Ok(share) if share > 0.0 && share <= 1.0 => {
+            let percent = (1e10 * share).round() / 1e8;
+            format!(": write `{percent}%` or `{share}%`")
+        }
+        _ => String::new(),
+    }
+}
+
 /// A percentage from 0 to 100.
 pub(super) fn percent(text: &str) -> Result<f64, ValueError> {
-    match text.trim_end_matches('%').trim().parse::<f64>() {
+    let number = text.strip_suffix('%');
+    match number.unwrap_or(text).trim().parse::<f64>() {
+        // 0.99 may mean 99 % or 0.99 %.
+        Ok(value) if number.is_none() && value > 0.0 && value <= 1.0 => Err(ValueError::Percent {
+            found: text.to_owned(),
+        }),
         Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
         _ => Err(ValueError::Percent {
             found: text.to_owned(),

@@ -15,11 +15,13 @@ pub(crate) const WAIT: Duration = Duration::from_millis(200);
 /// Registers `session` in the embedded catalogue of its folder; prints a note if that fails. Its entry is then stale until
 /// `skinrig catalogue register` or the next command that changes it.
 pub(crate) fn register(session: &Path) {
-    if let Err(e) = try_register(session) {
-        errln!(
+    match try_register(session) {
+        Ok(()) => {}
+        Err(e @ CatalogueError::OtherName { .. }) => errln!("note: not in the catalogue: {e}"),
+        Err(e) => errln!(
             "note: {} is not in the catalogue as it is: {e}\n  next: `skinrig catalogue register {0}`",
             session.display()
-        );
+        ),
     }
 }
 

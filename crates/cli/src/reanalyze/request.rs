@@ -160,6 +160,8 @@ impl Request {
         if self.stored().is_some_and(|stored| stored.is_sealed) {
             return Ok(());
         }
+        let own = analyses::results_path(&self.session, Some(&self.name));
+        results::check_writable(&own)?;
         let found = results::analyze_session(&self.session, self.choices())?;
         // New results never stand beside an older report, even if this program is killed between the two.
         let report = analyses::report_path(&self.session, Some(&self.name));

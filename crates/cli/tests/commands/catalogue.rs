@@ -273,6 +273,12 @@ fn a_run_does_without_a_catalogue() {
         status.contains("unreadable  b.session.sqlite: "),
         "{status}"
     );
+    // The next list of the folder would leave it out.
+    let unlisted = lab.text("s/copy.sqlite");
+    std::fs::copy(&session, &unlisted).unwrap();
+    skinrig(&["catalogue", "register", &unlisted])
+        .code(2)
+        .expect_stderr(&["a name that ends with `.session.sqlite`", "rename the file"]);
     std::fs::write(
         lab.path("s").join("prototypes.yaml"),
         "skinrig_prototypes: 1\nprototypes: [{nam: a}]\n",

@@ -389,6 +389,22 @@ fn a_folder_that_cannot_be_written_ends_with_code_1_and_a_next_step() {
         .expect_stderr(&["next:", "--sessions"]);
 }
 
+/// Before the minutes of an analysis, not after them.
+#[test]
+fn results_that_cannot_be_written_are_refused_before_they_are_computed() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let out = lab.text("none/results.json");
+    for command in ["analyze", "tradeoff"] {
+        let refused = skinrig(&[command, &session, "--out", &out, "--json"]).code(1);
+        assert!(
+            refused.err.contains("next: create its folder"),
+            "{refused:?}"
+        );
+        assert!(!refused.err.contains("reading"), "{refused:?}");
+    }
+}
+
 #[test]
 fn sessions_that_start_in_the_same_second_get_files_of_their_own() {
     let lab = Lab::new();

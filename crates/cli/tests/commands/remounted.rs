@@ -76,6 +76,26 @@ fn a_session_is_analysed_with_an_earlier_calibration_or_the_reason_is_given() {
         tip.err.contains("the tip `cube`, found `sphere 5 mm`"),
         "{tip:#?}"
     );
+    // Other rigs have other events.
+    let level = record("g", &[&elsewhere[..], &["--level", "optical"]].concat());
+    let level = analyze(&later, &level).code(2);
+    assert!(
+        level
+            .err
+            .contains("(simulated, level geometric), found simulated, level optical"),
+        "{level:#?}"
+    );
+    let faulty = record(
+        "h",
+        &[&elsewhere[..], &["--fault", "trigger-lost@press:3"]].concat(),
+    );
+    let faulty = analyze(&later, &faulty).code(2);
+    assert!(
+        faulty
+            .err
+            .contains("expected the same planted faults as here (none), found"),
+        "{faulty:#?}"
+    );
     let biases = changed("f", "cameras.camera1.biases.bias_fo=1600");
     assert!(
         biases.err.contains("bias_fo 1477, found 1600"),

@@ -117,6 +117,42 @@ fn a_grid_is_two_numbers_of_pixels() {
     }
 }
 
+/// Values that could mean two things, and options without the one that they belong to.
+#[test]
+fn an_ambiguous_or_unused_option_is_refused() {
+    let tradeoff = |more: &[&str]| {
+        let words = [&["tradeoff", "none.session.sqlite"], more].concat();
+        skinrig(&words).code(2).err
+    };
+    let share = tradeoff(&["--min-located", "0.99"]);
+    assert!(share.contains("write `99%` or `0.99%`"), "{share}");
+    let cost = tradeoff(&["--cost", "delay"]);
+    assert!(cost.contains("--target-rmse <LENGTH>"), "{cost}");
+    // The tip works.
+    let negative = tradeoff(&["--target-rmse", "-1mm"]);
+    let tip = "tip: a value that starts with `-` follows `=`: `--target-rmse=-1mm`";
+    assert!(negative.contains(tip), "{negative}");
+    let negative = tradeoff(&["--target-rmse=-1mm"]);
+    assert!(
+        negative.contains("expected a length") && negative.contains("-1mm"),
+        "{negative}"
+    );
+}
+
+/// Nothing tells which part of the rows the touches are in.
+#[test]
+fn without_calibration_presses_no_part_of_the_rows_is_offered() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &["--set", PLACES]));
+    let output = skinrig(&["--json", "tradeoff", &session, "--repeats", "1"]);
+    let output = output.code(0).json();
+    let rows = output["tradeoff"]["rows"].as_array().unwrap();
+    assert!(rows.len() > 40, "{}", rows.len());
+    let parts = rows.iter().filter(|row| row["choice"]["region"] != "full");
+    assert_eq!(parts.count(), 0);
+    assert_eq!(output["tradeoff"]["predictions"]["combinations"], 6930 / 3);
+}
+
 #[test]
 fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
     let lab = Lab::new();
