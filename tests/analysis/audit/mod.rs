@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod rigs;
+mod rows;
 
 use rayon::prelude::*;
 use rigs::{Random, Session, SessionOptions, session, sound};
@@ -138,41 +139,6 @@ fn a_shifted_press_list() {
             shift(input, 1, false)
         })
     });
-}
-
-/// The other rows agree with the cameras: valid sessions with a large error, but for the law.
-#[test]
-fn a_part_of_the_press_list_in_another_order() {
-    let wishes = SessionOptions {
-        places: 20,
-        ..SessionOptions::default()
-    };
-    // Two lines of the meander exchanged; ten rows in reverse.
-    let exchanged = |i: usize| if i < 10 { i + 5 } else { i - 5 };
-    let reversed = |i: usize| 19 - i;
-    for order in [&exchanged as &(dyn Fn(usize) -> usize + Sync), &reversed] {
-        names(Fault::OrderOfPresses, |seed| {
-            edit(seed, wishes, |input| reorder(input, 5..15, order))
-        });
-    }
-}
-
-/// Gives each row in `rows` of every repetition the position of row `from` of it.
-fn reorder(
-    input: &mut SessionInput,
-    rows: std::ops::Range<usize>,
-    from: &(dyn Fn(usize) -> usize + Sync),
-) {
-    let before = input.planned.clone();
-    for (i, press) in before.iter().enumerate() {
-        let row = press.location.index() as usize;
-        if press.role == PressRole::Sync || !rows.contains(&row) {
-            continue;
-        }
-        let at = before[i + from(row) - row].at;
-        input.planned[i].at = at;
-        input.outcomes[i].as_mut().unwrap().measured_at = Some(at);
-    }
 }
 
 /// All presses have a burst in both cameras: only the columns tell that one camera shows other presses.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_model::{Point2, PressRole, Verdict};
+use skinrig_model::{LocationId, Point2, PressRole, Verdict};
 
 use super::finding::finding;
 use crate::metrics::spread_mm;
@@ -15,12 +15,10 @@ pub(super) fn findings(analysis: &Analysis) -> Option<Finding> {
     let counts = |p: &&PressResult| {
         p.role == PressRole::Score && p.verdict == Verdict::Valid && p.estimate().is_some()
     };
-    let scored = analysis.presses.iter().filter(counts);
-    let truths: Vec<Point2> = scored.filter_map(|p| p.truth).collect();
-    let places: BTreeSet<(u64, u64)> = truths
-        .iter()
-        .map(|p| (p.x_mm.to_bits(), p.y_mm.to_bits()))
-        .collect();
+    let scored = || analysis.presses.iter().filter(counts);
+    let truths: Vec<Point2> = scored().filter_map(|p| p.truth).collect();
+    // One location is never at the same measured position twice.
+    let places: BTreeSet<LocationId> = scored().map(|p| p.location).collect();
     let (rmse_mm, ignorance_mm) = (
         analysis.scored.rmse_mm.value?,
         spread_mm(truths.iter().copied()),

@@ -12,7 +12,7 @@ use super::observed_press::ObservedPress;
 use super::readings::{MIN_SPREAD_DEG, Path, Reading, ScoredReading};
 use super::rearranged::rearranged_rows;
 use super::resection::{residuals, spread_deg};
-use super::segments::shifted_rest;
+use super::segments::shifted_segment;
 use super::statistics::median;
 use crate::result::{Analysis, Evidence, Fault, Finding, Law};
 
@@ -142,8 +142,8 @@ fn off_deg(judged: &ScoredReading<'_>) -> [Option<f64>; 2] {
 
 /// A shift that starts at some press, in both streams or in one.
 fn shifted_later(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> {
-    let both = shifted_rest(path, as_is, &[0, 1]);
-    let alone = [0, 1].map(|k| shifted_rest(path, as_is, &[k]));
+    let both = shifted_segment(path, as_is, &[0, 1]);
+    let alone = [0, 1].map(|k| shifted_segment(path, as_is, &[k]));
     let (rest, camera) = match (both, alone) {
         // A shift in one stream is a clock fault; a faulty press list shifts both.
         (_, [Some(rest), None]) => (rest, Some(CameraId::One)),
@@ -160,7 +160,7 @@ fn shifted_later(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> 
         from: path.presses_seen[rest.from].press,
         rows: rest.by,
         log_odds: rest.gain,
-        presses: path.presses_seen.len() - rest.from,
+        presses: rest.to - rest.from,
     };
     let mut found = finding(Law::CentroidFollowsPosition, fault, camera, evidence);
     found.invalidates = true;

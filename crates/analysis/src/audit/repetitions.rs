@@ -1,8 +1,8 @@
-//! Law: repetitions at one location agree.
+//! Law: presses at one place agree: repetitions of a location, and locations at the same position.
 
 use std::collections::BTreeMap;
 
-use skinrig_model::{CameraId, LocationId, RepetitionId};
+use skinrig_model::{CameraId, LocationId, PressRole, RepetitionId};
 
 use super::finding::finding;
 use super::observed_press::ObservedPress;
@@ -23,17 +23,59 @@ const MEDIAN_ERROR: f64 = 1.858;
 pub(super) fn findings(presses_seen: &[ObservedPress<'_>]) -> Vec<Finding> {
     CameraId::ALL
         .into_iter()
-        .filter_map(|camera| disagreement(presses_seen, camera))
+        .filter_map(|camera| {
+            disagreement(presses_seen, camera).or_else(|| same_position(presses_seen, camera))
+        })
         .collect()
+}
+
+/// Presses of one depth that share a position within a repetition, as rows of a list of which a coordinate is lost do: what one camera
+/// sees of them.
+fn same_position(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<Finding> {
+    let mut groups: BTreeMap<(RepetitionId, [u64; 3]), Vec<f64>> = BTreeMap::new();
+    for touch in presses_seen.iter().filter(|t| t.role != PressRole::Sync) {
+        let (at, depth) = (touch.at(), touch.place.1);
+        let key = [at.x_mm.to_bits(), at.y_mm.to_bits(), depth];
+        let group = groups.entry((touch.repetition, key)).or_default();
+        group.extend(touch.sights[camera.index()].column);
+    }
+    let distances = |columns: &[f64]| {
+        let middle = median(columns.to_vec());
+        let each = columns.iter().map(|c| Some((c - middle?).abs()));
+        each.collect::<Option<Vec<f64>>>()
+    };
+    let shared = groups.values().filter(|group| group.len() > 1);
+    let off: Vec<f64> = shared
+        .filter_map(|group| distances(group))
+        .flatten()
+        .collect();
+    let all: Vec<f64> = groups.values().flatten().copied().collect();
+    let all_off = distances(&all)?;
+    let (pairs, off_px, all_px) = (off.len(), median(off)?, median(all_off)?);
+    if pairs < MIN_PAIRS || off_px <= MIN_MOVE_PX || off_px <= MAX_SHARE * all_px {
+        return None;
+    }
+    let evidence = Evidence::SamePosition {
+        off_px,
+        all_px,
+        camera,
+        presses: pairs,
+    };
+    let mut found = finding(
+        Law::RepetitionsAgree,
+        Fault::Unknown,
+        Some(camera),
+        evidence,
+    );
+    // Their positions are not where they were.
+    found.invalidates = true;
+    Some(found)
 }
 
 fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<Finding> {
     let mut first: BTreeMap<(LocationId, u64), (RepetitionId, f64)> = BTreeMap::new();
     let mut moves: BTreeMap<RepetitionId, Vec<f64>> = BTreeMap::new();
-    for touch in presses_seen
-        .iter()
-        .filter(|t| t.role != skinrig_model::PressRole::Sync)
-    {
+    for touch in presses_seen.iter().filter(|t| t.role != PressRole::Sync) {
         let Some(column) = touch.sights[camera.index()].column else {
             continue;
         };

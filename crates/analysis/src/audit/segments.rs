@@ -1,4 +1,6 @@
-//! Detects a press list that is correct at first and shifted later: an extra or missing press in the middle.
+//! Detects a press list of which a part is shifted: an extra or missing press in the middle, made up for later or never.
+
+use skinrig_model::Point2;
 
 use super::readings::{MAX_SHIFT, Path, ScoredReading};
 use super::resection::residual_deg;
@@ -7,7 +9,7 @@ use super::resection::residual_deg;
 const MAX_PRESS: f64 = 4.0;
 /// Cost of a change of the shift, nats.
 const CHANGE: f64 = 12.0;
-/// Minimum number of presses in the shifted rest,
+/// Minimum number of presses in the shifted part,
 const MIN_PRESSES: usize = 8;
 /// its minimum share of all presses,
 const MIN_SHARE: f64 = 0.15;
@@ -15,20 +17,26 @@ const MIN_SHARE: f64 = 0.15;
 const MIN_GAIN: f64 = 25.0;
 const MIN_GAIN_PER_PRESS: f64 = 0.3;
 
-/// The shifted rest of a session.
+/// A part that ends before the session does runs over lines of several directions: the mean of its displacements is at most this
+/// share of their mean length. The errors of a skin itself displace neighbours alike.
+const MAX_ALIKE: f64 = 0.5;
+
+/// The shifted part of a session.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ShiftedSegment {
     /// Index of its first press in the path, from 0.
     pub from: usize,
+    /// Index after its last press.
+    pub to: usize,
     /// Shift of the position in rows.
     pub by: i32,
     /// Log likelihood gain, nats.
     pub gain: f64,
 }
 
-/// Looks for a shift that begins within the session and lasts to its end, in the streams of `cameras`, with the cameras of
-/// `as_is`.
-pub(crate) fn shifted_rest(
+/// Looks for a shift that begins within the session and lasts to its end, or in both streams over a part of it, in the streams of
+/// `cameras`, with the cameras of `as_is`.
+pub(crate) fn shifted_segment(
     path: &Path<'_>,
     as_is: &ScoredReading<'_>,
     cameras: &[usize],
@@ -52,21 +60,27 @@ pub(crate) fn shifted_rest(
             })
             .sum()
     };
-    // Backwards: the best shift of all presses from each one onwards, against no shift.
-    let mut gains = vec![0.0; shifts.len()];
+    // Backwards: for each shift, its gain against none from each press onwards, and the best end of it.
+    let may_end = cameras.len() == 2;
+    let mut gains = vec![(0.0, n); shifts.len()];
     let mut best: Option<ShiftedSegment> = None;
     for from in (0..n).rev() {
         let none = loss(from, 0);
-        for (gain, by) in gains.iter_mut().zip(&shifts) {
+        for ((gain, to), by) in gains.iter_mut().zip(&shifts) {
+            if may_end && *gain < -CHANGE {
+                (*gain, *to) = (-CHANGE, from + 1);
+            }
             *gain += none - loss(from, *by);
-            let rest = n - from;
+            let rest = *to - from;
             let enough = rest >= MIN_PRESSES
                 && rest as f64 >= MIN_SHARE * n as f64
                 && *gain - CHANGE > MIN_GAIN
                 && *gain > MIN_GAIN_PER_PRESS * rest as f64;
-            if *by != 0 && enough && best.is_none_or(|b| *gain - CHANGE > b.gain) {
+            let is_best = best.is_none_or(|b| *gain - CHANGE > b.gain);
+            if *by != 0 && enough && is_best && (*to == n || turns(path, from..*to, *by)) {
                 best = Some(ShiftedSegment {
                     from,
+                    to: *to,
                     by: *by,
                     gain: *gain - CHANGE,
                 });
@@ -74,4 +88,17 @@ pub(crate) fn shifted_rest(
         }
     }
     best
+}
+
+/// True if the displacements by such a shift point in several directions.
+fn turns(path: &Path<'_>, part: std::ops::Range<usize>, by: i32) -> bool {
+    let moves = part.filter_map(|i| {
+        let (own, there): (Point2, Point2) = (path.presses_seen[i].at(), path.shifted(i, by)?);
+        Some((there.x_mm - own.x_mm, there.y_mm - own.y_mm))
+    });
+    let (mut x, mut y, mut length) = (0.0, 0.0, 0.0);
+    for (dx, dy) in moves {
+        (x, y, length) = (x + dx, y + dy, length + libm::hypot(dx, dy));
+    }
+    libm::hypot(x, y) < MAX_ALIKE * length
 }

@@ -29,8 +29,10 @@ const PROPOSING: usize = 3;
 const UNEXPLAINED: f64 = 2.2;
 /// Another shift must be this much likelier than none, nats: 60,000 to 1, because hundreds are compared.
 const CLEARLY: f64 = 11.0;
-/// Minimum number of presses.
+/// Minimum number of presses, and of those that a shift explains;
 const MIN_PRESSES: usize = 6;
+/// it explains at least this share of all: a few bursts of noise fit some shift by chance.
+const MIN_SHARE: f64 = 1.0 / 3.0;
 
 /// `contacts_s`: contacts detected in the counts of each camera, s on the host clock, ascending.
 pub(super) fn findings(
@@ -107,7 +109,8 @@ fn likelier_shift(listed: &[f64], contacts: &[f64]) -> Option<Shift> {
         }
     });
     let best = judged.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-    (best.gain > CLEARLY).then_some(best)
+    let many = best.explained >= MIN_PRESSES && best.explained as f64 >= MIN_SHARE * n as f64;
+    (many && best.gain > CLEARLY).then_some(best)
 }
 
 /// Presses with a contact of their own after `shift_s`.
@@ -172,6 +175,13 @@ mod tests {
                 "every {missing}th"
             );
         }
+        // Slow presses have no bursts; a few of noise are as far apart as some presses.
+        let noise = [0.3, 1.7, 7.9, 9.2].map(|s| listed[0] - 30.0 + s);
+        let few: Vec<f64> = noise
+            .into_iter()
+            .chain(moved(&listed[..4], -26.75))
+            .collect();
+        assert_eq!(likelier_shift(&listed, &few), None);
         assert_eq!(likelier_shift(&listed, &[]), None);
         assert_eq!(likelier_shift(&listed, &listed[..30]), None);
         assert_eq!(likelier_shift(&listed, &listed[20..]), None);

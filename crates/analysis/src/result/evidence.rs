@@ -368,8 +368,8 @@ pub enum Evidence {
     },
     /// From some press on, the columns are those of other rows.
     #[error(
-        "expected columns on the viewing angles of their own presses, found those from {from} onwards at the \
-         position {rows:+} rows later: odds of e^{log_odds:.0} (n {presses} presses)"
+        "expected columns on the viewing angles of their own presses, found those of {presses} presses from {from} on at the \
+         position {rows:+} rows later: odds of e^{log_odds:.0}"
     )]
     ShiftedRest {
         /// First press.
@@ -378,7 +378,7 @@ pub enum Evidence {
         rows: i32,
         /// Log odds (natural) against no shift.
         log_odds: f64,
-        /// Presses from the first one on.
+        /// Presses in a row, from the first one on.
         presses: usize,
     },
     /// Some rows of the list are in another order.
@@ -511,6 +511,21 @@ pub enum Evidence {
         camera: CameraId,
         /// Presses compared.
         pairs: usize,
+    },
+    /// Locations at the same position look different.
+    #[error(
+        "expected presses at the same position to agree, found them {off_px:.1} px from each other's middle in the median, where all \
+         presses are {all_px:.1} px from theirs ({camera}, n {presses})"
+    )]
+    SamePosition {
+        /// Median distance within a position, px.
+        off_px: f64,
+        /// Median distance of all presses from their middle, px.
+        all_px: f64,
+        /// The camera.
+        camera: CameraId,
+        /// Presses that share a position.
+        presses: usize,
     },
     /// A camera's clock could not be aligned.
     #[error(

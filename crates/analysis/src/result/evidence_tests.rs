@@ -178,8 +178,8 @@ fn of_positions() -> Vec<(Value, &'static str)> {
         ),
         (
             json!({"kind": "shifted_rest", "from": 7, "rows": 2, "log_odds": 30.0, "presses": 18}),
-            "expected columns on the viewing angles of their own presses, found those from press 7 onwards at the \
-             position +2 rows later: odds of e^30 (n 18 presses)",
+            "expected columns on the viewing angles of their own presses, found those of 18 presses from press 7 on at the \
+             position +2 rows later: odds of e^30",
         ),
         (
             json!({"kind": "rearranged_rows", "from": 6, "to": 15, "rows": 10, "log_odds": 80.0}),
@@ -236,6 +236,11 @@ fn of_positions() -> Vec<(Value, &'static str)> {
                 "camera": "camera1", "pairs": 25}),
             "expected repetitions of a location to agree, found repetition 2 off by 60.0 px in the median, where locations \
              differ by 80.0 px from their middle (camera 1, n 25)",
+        ),
+        (
+            json!({"kind": "same_position", "off_px": 60.0, "all_px": 80.0, "camera": "camera1", "presses": 25}),
+            "expected presses at the same position to agree, found them 60.0 px from each other's middle in the median, where all \
+             presses are 80.0 px from theirs (camera 1, n 25)",
         ),
         (
             json!({"kind": "no_better_than_guess", "rmse_mm": 20.0, "guess_mm": 18.5, "presses": 25}),

@@ -96,6 +96,7 @@ fn hero(a: &Analysis, rmse: &MetricRow) -> Group {
             .add(format!("n = {} scored presses", rmse.n))
     }];
     if usable {
+        remarks.extend(derive::rmse_elsewhere(a).map(Text::from));
         remarks.extend(other_counts(a).into_iter().map(Text::from));
     }
     if let Some(note) = derive::geometry_note(a) {

@@ -75,6 +75,9 @@ fn head(input: &ReportInput<'_>) -> Vec<Note> {
         };
         Note::new("RMSE", text).tone(Tone::Answer)
     });
+    if a.is_valid() && a.findings.is_empty() {
+        notes.extend(derive::rmse_elsewhere(a).map(|text| Note::new("", text)));
+    }
     notes.extend(selection::without(input).map(|text| Note::new("", text).warning()));
     if a.is_valid() {
         notes.extend(line(a).map(|text| Note::new("depth", text)));

@@ -1,0 +1,72 @@
+//! Lists of presses of which a part is wrong.
+
+use super::*;
+
+/// A row too many and later one too few: the ends of the list are right.
+#[test]
+fn a_part_of_the_press_list_is_shifted() {
+    let wishes = SessionOptions {
+        places: 25,
+        ..SessionOptions::default()
+    };
+    for by in [1, -1] {
+        names(Fault::IndexShifted, |seed| {
+            edit(seed, wishes, |input| {
+                reorder(input, 6..20, &|i: usize| i.wrapping_add_signed(by))
+            })
+        });
+    }
+}
+
+/// Rows with one coordinate have the positions of others.
+#[test]
+fn a_coordinate_that_is_the_same_in_all_rows() {
+    let wishes = SessionOptions {
+        places: 25,
+        ..SessionOptions::default()
+    };
+    names(Fault::Unknown, |seed| {
+        edit(seed, wishes, |input| {
+            for (planned, outcome) in input.planned.iter_mut().zip(&mut input.outcomes) {
+                planned.at.y_mm = 2.0;
+                let at = outcome.as_mut().unwrap();
+                at.measured_at = at.measured_at.map(|p| Point2::new(p.x_mm, 2.0));
+            }
+        })
+    });
+}
+
+/// The other rows agree with the cameras: valid sessions with a large error, but for the law.
+#[test]
+fn a_part_of_the_press_list_in_another_order() {
+    let wishes = SessionOptions {
+        places: 20,
+        ..SessionOptions::default()
+    };
+    // Two lines of the meander exchanged; ten rows in reverse.
+    let exchanged = |i: usize| if i < 10 { i + 5 } else { i - 5 };
+    let reversed = |i: usize| 19 - i;
+    for order in [&exchanged as &(dyn Fn(usize) -> usize + Sync), &reversed] {
+        names(Fault::OrderOfPresses, |seed| {
+            edit(seed, wishes, |input| reorder(input, 5..15, order))
+        });
+    }
+}
+
+/// Gives each row in `rows` of every repetition the position of row `from` of it.
+fn reorder(
+    input: &mut SessionInput,
+    rows: std::ops::Range<usize>,
+    from: &(dyn Fn(usize) -> usize + Sync),
+) {
+    let before = input.planned.clone();
+    for (i, press) in before.iter().enumerate() {
+        let row = press.location.index() as usize;
+        if press.role == PressRole::Sync || !rows.contains(&row) {
+            continue;
+        }
+        let at = before[i + from(row) - row].at;
+        input.planned[i].at = at;
+        input.outcomes[i].as_mut().unwrap().measured_at = Some(at);
+    }
+}
