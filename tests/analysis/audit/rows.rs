@@ -18,6 +18,27 @@ fn a_part_of_the_press_list_is_shifted() {
     }
 }
 
+/// The calibration would move the cameras with the positions, and find a smaller error.
+#[test]
+fn positions_in_a_scale_of_no_unit() {
+    let wishes = SessionOptions {
+        places: 25,
+        ..SessionOptions::default()
+    };
+    for factors in [[0.6, 0.6], [0.5, 1.0], [1.7, 1.7]] {
+        names(Fault::UnitOfPositions, |seed| {
+            edit(seed, wishes, |input| {
+                let scaled = |p: Point2| Point2::new(factors[0] * p.x_mm, factors[1] * p.y_mm);
+                for (planned, outcome) in input.planned.iter_mut().zip(&mut input.outcomes) {
+                    planned.at = scaled(planned.at);
+                    let at = outcome.as_mut().unwrap();
+                    at.measured_at = at.measured_at.map(scaled);
+                }
+            })
+        });
+    }
+}
+
 /// Rows with one coordinate have the positions of others.
 #[test]
 fn a_coordinate_that_is_the_same_in_all_rows() {

@@ -54,7 +54,18 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     if as_is.fits == [None; 2] {
         return Vec::new();
     }
-    if let Some(finding) = another_reading(&path, &as_is) {
+    let mut readings = path.alternatives();
+    readings.extend(path.displaced(&as_is));
+    readings.push(path.as_planned());
+    readings.extend(path.streams_apart());
+    if let Some(finding) = another_reading(&path, &as_is, &readings) {
+        // Cameras on one side of the skin see another scale much as another origin.
+        if finding.fault == Fault::PositionsDisplaced {
+            readings.extend(path.stretched());
+            return another_reading(&path, &as_is, &readings)
+                .into_iter()
+                .collect();
+        }
         return vec![finding];
     }
     if let Some(finding) = shifted_later(&path, &as_is) {
@@ -64,6 +75,9 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
         return Vec::new();
     }
     if let Some(finding) = rearranged(&path, &as_is) {
+        return vec![finding];
+    }
+    if let Some(finding) = another_reading(&path, &as_is, &path.stretched()) {
         return vec![finding];
     }
     let lost: Vec<CameraId> = CameraId::ALL
@@ -103,12 +117,12 @@ fn one_camera_twice(presses_seen: &[ObservedPress<'_>]) -> Option<Finding> {
     })
 }
 
-/// The likeliest other reading, if it is clearly likelier than the session as recorded and explains it.
-fn another_reading(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> {
-    let mut readings = path.alternatives();
-    readings.extend(path.displaced(as_is));
-    readings.push(path.as_planned());
-    readings.extend(path.streams_apart());
+/// The likeliest of these readings, if it is clearly likelier than the session as recorded and explains it.
+fn another_reading(
+    path: &Path<'_>,
+    as_is: &ScoredReading<'_>,
+    readings: &[Reading],
+) -> Option<Finding> {
     let judged = readings.iter().map(|r| path.score(r));
     let reorders = |j: &ScoredReading<'_>| {
         let fault = j.reading.fault;

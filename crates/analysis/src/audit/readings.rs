@@ -22,6 +22,8 @@ pub(super) const MIN_SPREAD_DEG: f64 = 5.0;
 pub(crate) const MAX_SHIFT: i32 = 5;
 /// Cost of a fitted displacement, nats: two free parameters anywhere on the skin.
 const FREE_DISPLACEMENT: f64 = 4.0;
+/// Cost of a fitted stretch, nats: one of eighteen, within a factor of 2 of an unlikely mistake.
+const FREE_STRETCH: f64 = 4.0;
 /// Cost of a shift of each stream, nats: one of eleven each.
 const FREE_SHIFTS: f64 = 4.8;
 /// Maximum evidence of the sync presses against a reading, nats per camera: they share one location, which may be poorly
@@ -186,6 +188,15 @@ impl<'a> Path<'a> {
         }
         all.extend(self.reordered(&base));
         all
+    }
+
+    /// Positions in another scale. A smaller one makes the residuals of any wrong list smaller: these readings come after all others.
+    pub(super) fn stretched(&self) -> Vec<Reading> {
+        let readings = Frame::stretched().map(|frame| Reading {
+            penalty: FREE_STRETCH,
+            ..self.in_frame(&frame)
+        });
+        readings.collect()
     }
 
     /// The positions of a table given in `frame`.

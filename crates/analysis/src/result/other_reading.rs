@@ -23,6 +23,12 @@ pub enum FrameChange {
         /// Factor from the table to the skin frame.
         factor: f64,
     },
+    /// Stretched.
+    #[error("x multiplied by {:.2} and y by {:.2}", .factors[0], .factors[1])]
+    Stretched {
+        /// Factors from the table to the skin frame, along x and y.
+        factors: [f64; 2],
+    },
     /// Relative to another point of the skin.
     #[error("the skin's {origin} {}", if *.is_added { "added" } else { "subtracted" })]
     OtherOrigin {
