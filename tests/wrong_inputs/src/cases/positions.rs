@@ -102,6 +102,25 @@ pub(super) fn positions(t: &mut Table) {
         |s| import(s, |b| table(b, |p| moved(p, 25.0, 0.0))),
         PositionsDisplaced,
     );
+    let scale = [Named(UnitOfPositions), Named(PositionsDisplaced)];
+    t.papers(
+        "0.6 times as large",
+        |s| import(s, |b| table(b, |p| times(p, 0.6))),
+        right_table,
+        &scale,
+    );
+    t.papers(
+        "x half as large",
+        |s| import(s, |b| table(b, |p| Point2::new(0.5 * p.x_mm, p.y_mm))),
+        right_table,
+        &scale,
+    );
+    t.papers(
+        "the same y in all rows",
+        |s| import(s, |b| table(b, |p| Point2::new(p.x_mm, 0.0))),
+        right_table,
+        &[Named(Unknown), Refused],
+    );
     t.case(
         "shifted by 2 mm",
         |s| import(s, |b| table(b, |p| moved(p, 2.0, 0.0))),
@@ -207,6 +226,22 @@ pub(super) fn rows(t: &mut Table) {
         |s| import(s, |b| b.table.rotate_left(3)),
         right_table,
         &shifted,
+    );
+    t.papers(
+        "a row twice, and a later one missing",
+        |s| {
+            import(s, |b| {
+                b.table.remove(17);
+                b.table.insert(4, b.table[4]);
+            })
+        },
+        right_table,
+        &[
+            Named(IndexShifted),
+            Named(OrderOfPresses),
+            Named(ClockWrong),
+            Refused,
+        ],
     );
     t.papers(
         "two rows exchanged",
