@@ -22,7 +22,7 @@ pub(super) const MIN_SPREAD_DEG: f64 = 5.0;
 pub(crate) const MAX_SHIFT: i32 = 5;
 /// Cost of a fitted displacement, nats: two free parameters anywhere on the skin.
 const FREE_DISPLACEMENT: f64 = 4.0;
-/// Cost of a fitted stretch, nats: one of eighteen, within a factor of 2 of an unlikely mistake.
+/// Cost of a stretch, nats: one of eighteen (2.9), and rarer than a wrong unit.
 const FREE_STRETCH: f64 = 4.0;
 /// Cost of a shift of each stream, nats: one of eleven each.
 const FREE_SHIFTS: f64 = 4.8;

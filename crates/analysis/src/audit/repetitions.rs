@@ -1,4 +1,4 @@
-//! Law: presses at one place agree: repetitions of a location, and locations at the same position.
+//! Law: presses at one place agree: repetitions of a location, and presses at the same position.
 
 use std::collections::BTreeMap;
 

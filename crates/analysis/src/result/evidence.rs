@@ -512,7 +512,7 @@ pub enum Evidence {
         /// Presses compared.
         pairs: usize,
     },
-    /// Locations at the same position look different.
+    /// Presses at the same position look different.
     #[error(
         "expected presses at the same position to agree, found them {off_px:.1} px from each other's middle in the median, where all \
          presses are {all_px:.1} px from theirs ({camera}, n {presses})"
