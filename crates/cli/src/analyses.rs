@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 use skinrig_catalogue::{ANALYSIS_MARK, RESULTS_SUFFIX};
-use skinrig_recorder::SessionReader;
+use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{Summary, Variant};
 
 use crate::analysis_request::AnalysisRequest;
@@ -181,10 +181,14 @@ pub(crate) fn variant(session: &Path, session_id: &str, name: &str) -> Result<Va
     })
 }
 
-/// Hash of the session's content, of its seal, `Some(None)` without a seal; `None` if it cannot be read.
-fn content_of(session: &Path) -> Option<Option<String>> {
-    let reader = SessionReader::open(session).ok()?;
-    Some(reader.seal().ok()?.map(|seal| seal.content_sha256()))
+/// Hash of the session's content, of its seal; `None` without a seal.
+///
+/// # Errors
+/// If the session cannot be read, or its header is not the sealed one.
+fn content_of(session: &Path) -> Result<Option<String>, RecorderError> {
+    let reader = SessionReader::open(session)?;
+    reader.headline()?;
+    Ok(reader.seal()?.map(|seal| seal.content_sha256()))
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ pub(crate) fn inspect(args: &InspectArgs, as_json: bool) -> Outcome {
 
 /// A session's camera streams, decoded from its chunks.
 fn inspect_session(path: &Path, gap_us: u64) -> Result<Inspection, Failure> {
-    let reader = SessionReader::open(path).map_err(Failure::session)?;
+    let reader = SessionReader::open_unchanged(path).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
     let mut streams = Vec::new();
     for camera in CameraId::ALL {

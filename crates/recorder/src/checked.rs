@@ -1,4 +1,4 @@
-//! Opens a session to compute results, once its rows agree with its seal or, without one, with each other.
+//! Opens a session whose rows agree with its seal or, without one, with each other.
 
 use std::path::Path;
 
@@ -16,8 +16,26 @@ impl SessionReader {
     /// Those of [`open`](Self::open); [`RecorderError::Changed`]; [`RecorderError::Contradictory`].
     pub fn open_checked(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let reader = Self::open(path)?;
-        let seal = reader.seal_row()?;
-        let tables = reader.query("checking the seal", async |conn| {
+        if !reader.compare_with_seal()? {
+            check_unsealed(&reader)?;
+        }
+        Ok(reader)
+    }
+
+    /// Opens a session to describe it. Compares the rows of a sealed one with its seal; an unsealed one may be growing or damaged.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open); [`RecorderError::Changed`].
+    pub fn open_unchanged(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
+        let reader = Self::open(path)?;
+        reader.compare_with_seal()?;
+        Ok(reader)
+    }
+
+    /// True for rows that are those of the seal, false without a seal.
+    fn compare_with_seal(&self) -> Result<bool, RecorderError> {
+        let seal = self.seal_row()?;
+        let tables = self.query("checking the seal", async |conn| {
             let recorded = sealed_tables(conn).await?;
             // A power cut leaves them behind without a seal.
             if seal.is_none() && recorded.is_empty() {
@@ -33,13 +51,10 @@ impl SessionReader {
             Ok(names)
         })?;
         if tables.is_empty() {
-            if seal.is_none() {
-                check_unsealed(&reader)?;
-            }
-            return Ok(reader);
+            return Ok(seal.is_some());
         }
         Err(RecorderError::Changed {
-            path: reader.path().to_owned(),
+            path: self.path().to_owned(),
             tables,
         })
     }

@@ -90,7 +90,10 @@ impl Cache {
         drop(cache);
         let known = match found {
             Some(known) => known,
-            None => Arc::new(ParsedSession::read(&reader, lab, path, variant)?),
+            None => {
+                let unchanged = SessionReader::open_unchanged(path)?;
+                Arc::new(ParsedSession::read(&unchanged, lab, path, variant)?)
+            }
         };
         let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         cache.retain(|(s, _)| s.path != stamp.path || s.variant != stamp.variant);

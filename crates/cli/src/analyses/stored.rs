@@ -36,7 +36,11 @@ struct VariantName {
 /// are missing, belong to another session or analysis or to an earlier content of the session, come from another version of the
 /// analysis, or were changed.
 pub(crate) fn stored(session: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis> {
-    stored_of(session, (session_id, content_of(session)?.as_deref()), name)
+    stored_of(
+        session,
+        (session_id, content_of(session).ok()?.as_deref()),
+        name,
+    )
 }
 
 /// As [`stored`], for a session with this identifier and content that need not be beside its results.

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 use skinrig_catalogue::results_digest::{self, DigestError};
+use skinrig_recorder::RecorderError;
 use skinrig_report::Summary;
 
 use super::{content_of, results_path};
@@ -47,6 +48,9 @@ pub(crate) enum SummaryError {
     /// The file has no digest, or that of another content.
     #[error(transparent)]
     Changed(#[from] DigestError),
+    /// The session cannot be read, or was changed after it was sealed.
+    #[error(transparent)]
+    Session(#[from] RecorderError),
     /// The file cannot be read.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -70,7 +74,7 @@ pub(crate) fn summary(
     if found.session_id != session_id {
         return Err(SummaryError::OtherSession);
     }
-    if content_of(session).is_none_or(|content| content != found.content_sha256) {
+    if content_of(session)? != found.content_sha256 {
         return Err(SummaryError::OtherContent);
     }
     match (&found.variant, name) {

@@ -87,7 +87,7 @@ pub(crate) fn fact_differences(
     sides: [(&Path, Option<&str>); 2],
 ) -> Result<(Vec<Difference>, usize), Failure> {
     let side = |(path, name): (&Path, Option<&str>)| {
-        let reader = SessionReader::open(path).map_err(Failure::session)?;
+        let reader = SessionReader::open_unchanged(path).map_err(Failure::session)?;
         let header = reader.header().map_err(Failure::session)?;
         let facts = facts::facts(path, &reader, &header)?;
         if let Some(name) = name {

@@ -290,7 +290,7 @@ fn tip_depth_mm(reader: &SessionReader, host_us: f64) -> Result<Option<f64>, Rec
 
 /// Opens a session that can be replayed, with its analysis.
 fn open_replayable(session: &Path) -> Result<(SessionReader, Analysis), Failure> {
-    let reader = SessionReader::open(session).map_err(Failure::session)?;
+    let reader = SessionReader::open_unchanged(session).map_err(Failure::session)?;
     let id = reader.session_id().map_err(Failure::session)?;
     let (analysis, legs) = analysis_for_tables(session, &reader, &id)?;
     if !legs.is_empty() {

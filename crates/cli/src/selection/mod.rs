@@ -161,7 +161,7 @@ fn look_up(folder: &Path, file: &str) -> Result<SessionFacts, SessionFault> {
 
 /// Facts of a session that a selection checks.
 fn facts(path: &Path) -> Result<SessionFacts, RecorderError> {
-    let reader = SessionReader::open(path)?;
+    let reader = SessionReader::open_unchanged(path)?;
     let seal = reader.seal()?;
     let presses = reader.presses()?;
     Ok(SessionFacts {

@@ -177,7 +177,7 @@ const OPEN: &str = "open";
 
 impl Description {
     pub(super) fn read(args: &ShowArgs) -> Result<Self, RecorderError> {
-        let reader = SessionReader::open(&args.session)?;
+        let reader = SessionReader::open_unchanged(&args.session)?;
         let header = reader.header()?;
         let id = reader.session_id()?;
         let end = reader.end()?;

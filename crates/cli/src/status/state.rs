@@ -103,7 +103,7 @@ fn notes<S: Serializer>(rows: &[NoteRow], serializer: S) -> Result<S::Ok, S::Err
 
 /// State of the session according to its file, as far as it is on the disk.
 pub(super) fn stored(session: &Path) -> Result<Stored, RecorderError> {
-    let reader = SessionReader::open(session)?;
+    let reader = SessionReader::open_unchanged(session)?;
     let header = reader.header()?;
     let mut outcomes: Vec<_> = reader
         .presses()?

@@ -262,3 +262,42 @@ fn intact_parts_of_a_damaged_session_are_salvaged_and_analysed() {
     assert!(matches!(shown.code, Some(0 | 2)), "{shown:#?}");
     assert_ne!(std::fs::read(&session).unwrap(), bytes);
 }
+
+/// Commands that describe a session, or rank it by stored results, do not pass edited rows for the recorded ones.
+#[test]
+#[cfg(unix)]
+fn a_sealed_session_that_was_edited_is_described_by_no_command() {
+    use std::os::unix::fs::PermissionsExt;
+    let lab = Lab::new();
+    let (session, bytes) = sealed_session(&lab);
+    let (path, folder) = (text(&session), lab.text("s"));
+    skinrig(&["analyze", &path]).code(0);
+    let edits = [
+        ("session", "UPDATE session SET prototype = 'other skin'"),
+        (
+            "attempt",
+            "UPDATE attempt SET measured_x_mm = measured_x_mm + 5 WHERE press = 3",
+        ),
+    ];
+    let selection = lab.text("chosen.yaml");
+    for (table, statement) in edits {
+        let writable = std::fs::Permissions::from_mode(0o644);
+        std::fs::set_permissions(&session, writable).unwrap();
+        std::fs::write(&session, &bytes).unwrap();
+        change(&session, statement);
+        let found = format!("expected the rows that were sealed, found others in {table}");
+        for command in [
+            &["show", &path][..],
+            &["inspect", &path],
+            &["status", &path],
+            &["select", &path, "--name", "chosen", "--out", &selection],
+        ] {
+            skinrig(command)
+                .code(2)
+                .expect_stderr(&[&found, "skinrig verify"]);
+        }
+        let ranked = skinrig(&["prototypes", &folder, "--json"]).code(0);
+        let ranked = ranked.json()[0]["series"][0]["points"][0].clone();
+        assert_eq!(ranked["rmse_mm"].is_null(), table == "session", "{ranked}");
+    }
+}
