@@ -12,7 +12,7 @@ use skinrig_recorder::{
 use crate::results::{self, AnalysisEntry};
 
 /// A session as the catalogue has it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct SessionEntry {
     /// Identity.
     pub headline: Headline,

@@ -23,6 +23,7 @@ mod question;
 mod questions;
 mod results;
 pub mod results_digest;
+mod results_error;
 mod roles;
 mod schema;
 mod status;
@@ -41,8 +42,9 @@ pub use question::{Answer, Parameter, ParameterKind, Question};
 
 pub use results::{
     ANALYSIS_MARK, AnalysisEntry, AnalysisFigures, CalibrationEntry, ClockEntry, EstimateEntry,
-    RESULTS_SUFFIX,
+    OFFICIAL, RESULTS_SUFFIX,
 };
+pub use results_error::ResultsError;
 pub use roles::{ROLES, Role};
 pub use status::{FolderStatus, StaleFile, Staleness, Unreadable};
 pub use value::Value;

@@ -1,6 +1,7 @@
 //! The list of questions.
 
 use crate::question::{Parameter, ParameterKind, Question};
+use crate::results::OFFICIAL;
 
 const fn required(name: &'static str) -> Parameter {
     Parameter {
@@ -20,7 +21,7 @@ const fn optional(name: &'static str, kind: ParameterKind, default: &'static str
 
 const PROTOTYPE: Parameter = required("prototype");
 const MIN_SESSIONS: Parameter = optional("min_sessions", ParameterKind::Count, "3");
-const ANALYSIS: Parameter = optional("analysis", ParameterKind::Text, "official");
+const ANALYSIS: Parameter = optional("analysis", ParameterKind::Text, OFFICIAL);
 const CAMERA: Parameter = optional(
     "camera",
     ParameterKind::Choice(&["camera1", "camera2"]),

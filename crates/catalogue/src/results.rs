@@ -10,13 +10,14 @@ use skinrig_recorder::SESSION_SUFFIX;
 
 use crate::press::{self, Press, PressEntry};
 use crate::results_digest;
+use crate::results_error::ResultsError;
 
 /// Precedes the variant's name in its file names.
 pub const ANALYSIS_MARK: &str = ".analysis-";
 /// Suffix of every results file.
 pub const RESULTS_SUFFIX: &str = ".results.json";
 /// Name of the official analysis in the catalogue; no variant may have it.
-pub(crate) const OFFICIAL: &str = "official";
+pub const OFFICIAL: &str = "official";
 /// Largest results file, bytes.
 const MOST_BYTES: u64 = 256 << 20;
 
@@ -26,12 +27,12 @@ pub(crate) fn stem_of(file: &str) -> &str {
 }
 
 /// An analysis as the catalogue has it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct AnalysisEntry {
     /// `official`, or the name of a variant.
     pub name: String,
     /// Its figures, or why its results cannot be used.
-    pub figures: Result<AnalysisFigures, String>,
+    pub figures: Result<AnalysisFigures, ResultsError>,
 }
 
 /// Figures of an analysis. Fields that its version did not have are empty.
@@ -247,25 +248,24 @@ fn figures(
     name: &str,
     session_id: &str,
     content: Option<&str>,
-) -> Result<AnalysisFigures, String> {
+) -> Result<AnalysisFigures, ResultsError> {
     let mut text = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|file| file.take(MOST_BYTES).read_to_end(&mut text))
-        .map_err(|e| e.to_string())?;
-    results_digest::check(&text).map_err(|e| e.to_string())?;
-    let found: Document = serde_json::from_slice(&text).map_err(|e| {
-        format!("results of another version of skinrig: analyze the session again ({e})")
-    })?;
+    std::fs::File::open(path).and_then(|file| file.take(MOST_BYTES).read_to_end(&mut text))?;
+    results_digest::check(&text)?;
+    let found: Document =
+        serde_json::from_slice(&text).map_err(|e| ResultsError::OtherVersion(Some(e)))?;
     let own = &found.provenance;
     if own.session_id != session_id {
-        return Err("the results belong to another session".to_owned());
+        return Err(ResultsError::OtherSession);
     }
     if own.content_sha256.as_deref() != content {
-        return Err("the results are older than the session: analyze it again".to_owned());
+        return Err(ResultsError::OtherContent);
     }
     let of = own.variant.as_ref().map_or(OFFICIAL, |v| v.name.as_str());
     if of != name {
-        return Err(format!("the results are those of the analysis `{of}`"));
+        return Err(ResultsError::OtherAnalysis {
+            found: of.to_owned(),
+        });
     }
     let changed = found.provenance.variant.map(|v| v.changed);
     let analysis = found.analysis;
@@ -274,7 +274,7 @@ fn figures(
     let maps = analysis.alignment.maps.iter().map(|clock| &clock.map);
     let fitted = analysis.calibration.iter().flat_map(|fit| &fit.names);
     let (Some(presses), true, true) = (presses, is_unique(maps), is_unique(fitted)) else {
-        return Err("the results list a press, a clock or a parameter twice, or an unknown cause: analyze the session again".to_owned());
+        return Err(ResultsError::Contradictory);
     };
     Ok(AnalysisFigures {
         version: analysis.version,

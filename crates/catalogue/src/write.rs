@@ -316,7 +316,11 @@ async fn analysis(db: &mut Db, id: &str, entry: &AnalysisEntry) -> Result<(), sq
         Ok(figures) => figures,
         Err(problem) => {
             let sql = "INSERT INTO analysis (session_id, name, problem) VALUES ($1, $2, $3)";
-            let values = [id.into(), (&entry.name).into(), problem.into()];
+            let values = [
+                id.into(),
+                (&entry.name).into(),
+                (&problem.to_string()).into(),
+            ];
             return db.execute(sql, &values).await.map(drop);
         }
     };

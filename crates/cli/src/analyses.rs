@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use skinrig_catalogue::{ANALYSIS_MARK, RESULTS_SUFFIX};
+use skinrig_catalogue::{ANALYSIS_MARK, OFFICIAL, RESULTS_SUFFIX};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{Summary, Variant};
 
@@ -70,7 +70,7 @@ pub(crate) fn parse(text: &str) -> Result<String, NameError> {
     let first = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
     let fits = text.len() <= MAX_CHARS && text.starts_with(first) && text.chars().all(plain);
     match (fits, text) {
-        (true, "official") => Err(NameError::Official),
+        (true, OFFICIAL) => Err(NameError::Official),
         (true, _) => Ok(text.to_owned()),
         (false, _) => Err(NameError::Characters {
             found: text.to_owned(),

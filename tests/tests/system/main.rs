@@ -13,3 +13,4 @@ mod online;
 mod overflow;
 mod paper_scene;
 mod retakes;
+mod unusual;

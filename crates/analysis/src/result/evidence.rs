@@ -514,8 +514,8 @@ pub enum Evidence {
     },
     /// Presses at the same position look different.
     #[error(
-        "expected presses at the same position to agree, found them {off_px:.1} px from each other's middle in the median, where all \
-         presses are {all_px:.1} px from theirs ({camera}, n {presses})"
+        "expected presses at the same position to agree, found their columns {off_px:.1} px from their middle (median), where those of \
+         all presses are {all_px:.1} px from theirs ({camera}, n {presses})"
     )]
     SamePosition {
         /// Median distance within a position, px.

@@ -239,8 +239,8 @@ fn of_positions() -> Vec<(Value, &'static str)> {
         ),
         (
             json!({"kind": "same_position", "off_px": 60.0, "all_px": 80.0, "camera": "camera1", "presses": 25}),
-            "expected presses at the same position to agree, found them 60.0 px from each other's middle in the median, where all \
-             presses are 80.0 px from theirs (camera 1, n 25)",
+            "expected presses at the same position to agree, found their columns 60.0 px from their middle (median), where those of \
+             all presses are 80.0 px from theirs (camera 1, n 25)",
         ),
         (
             json!({"kind": "no_better_than_guess", "rmse_mm": 20.0, "guess_mm": 18.5, "presses": 25}),

@@ -199,7 +199,8 @@ fn results_of_an_earlier_content_are_a_problem() {
     write(lab.path().join("0.results.json"), &older);
     lab.open().register(&[lab.session(0)]).unwrap();
     let sql = "SELECT rmse_mm, problem FROM analysis";
-    let expected = "rmse_mm=null|problem=the results are older than the session: analyze it again";
+    let expected =
+        "rmse_mm=null|problem=the results beside it are older than the session: analyze it again";
     assert_eq!(rows(&lab.file(), sql), [expected]);
     assert_eq!(column(&lab.file(), "SELECT count(*) FROM press"), ["0"]);
     // Once it is analyzed, they are those of the new content; once they are stale again, none.

@@ -8,7 +8,7 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use skinrig_catalogue::{
     AnalysisEntry, AnalysisFigures, CalibrationEntry, ClockEntry, EstimateEntry, LegEntry,
-    NoteEntry, PressEntry, SessionEntry,
+    NoteEntry, PressEntry, ResultsError, SessionEntry,
 };
 use skinrig_model::{CameraId, PressRole, Verdict as PressVerdict};
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, Part, Versions};
@@ -149,10 +149,7 @@ impl SyntheticLab {
             figures.presses = (0..planned as u32).map(|n| self.press(n)).collect();
             all.push(entry("official", Ok(figures)));
         } else if self.is(20) {
-            all.push(entry(
-                "official",
-                Err("results of another version".to_owned()),
-            ));
+            all.push(entry("official", Err(ResultsError::OtherVersion(None))));
         }
         if self.is(20) {
             let rmse = rmse - 0.1 * self.unit();

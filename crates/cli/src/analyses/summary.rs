@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use serde::Deserialize;
-use skinrig_catalogue::results_digest::{self, DigestError};
+use skinrig_catalogue::{OFFICIAL, ResultsError, results_digest};
 use skinrig_recorder::RecorderError;
 use skinrig_report::Summary;
 
@@ -23,37 +23,12 @@ pub(crate) enum SummaryError {
         /// The name.
         name: String,
     },
-    /// The results belong to another session.
-    #[error("the results beside it belong to another session")]
-    OtherSession,
-    /// The session has other content by now: it was resumed, or sealed.
-    #[error("the results beside it are older than the session: analyze it again")]
-    OtherContent,
-    /// The results belong to another variant.
-    #[error(
-        "expected the results of this analysis, found those of `{found}`: analyze the session again"
-    )]
-    OtherVariant {
-        /// Name of that variant.
-        found: String,
-    },
-    /// The results are the official ones.
-    #[error(
-        "expected the results of this analysis, found the official ones: analyze the session again"
-    )]
-    Official,
-    /// The results have no summary, or one that does not parse.
-    #[error("results of an older skinrig: analyze the session again")]
-    Older(#[source] Option<serde_json::Error>),
-    /// The file has no digest, or that of another content.
-    #[error(transparent)]
-    Changed(#[from] DigestError),
     /// The session cannot be read, or was changed after it was sealed.
     #[error(transparent)]
     Session(#[from] RecorderError),
-    /// The file cannot be read.
+    /// The results are of no use.
     #[error(transparent)]
-    Io(#[from] io::Error),
+    Results(#[from] ResultsError),
 }
 
 /// Reads the summary of an analysis from the end of its results. Rejects results of another session or analysis.
@@ -72,31 +47,29 @@ pub(crate) fn summary(
         (e, _) => e,
     })?;
     if found.session_id != session_id {
-        return Err(SummaryError::OtherSession);
+        return Err(ResultsError::OtherSession.into());
     }
     if content_of(session)? != found.content_sha256 {
-        return Err(SummaryError::OtherContent);
+        return Err(ResultsError::OtherContent.into());
     }
-    match (&found.variant, name) {
-        (None, None) => Ok(found),
-        (Some(variant), Some(name)) if variant.name == name => Ok(found),
-        (Some(variant), _) => Err(SummaryError::OtherVariant {
-            found: variant.name.clone(),
-        }),
-        (None, Some(_)) => Err(SummaryError::Official),
+    let of = found.variant.as_ref().map(|variant| variant.name.as_str());
+    if of != name {
+        let found = of.unwrap_or(OFFICIAL).to_owned();
+        return Err(ResultsError::OtherAnalysis { found }.into());
     }
+    Ok(found)
 }
 
 fn read_summary(path: &Path) -> Result<Summary, SummaryError> {
     let text = fs::read(path).map_err(|e| match e.kind() {
         io::ErrorKind::NotFound => SummaryError::NotAnalysed,
-        _ => e.into(),
+        _ => ResultsError::Io(e).into(),
     })?;
-    results_digest::check(&text)?;
+    results_digest::check(&text).map_err(ResultsError::Changed)?;
     // A key of the outermost object: a JSON string never contains a line break.
     let key = b"\n  \"summary\": ";
     let at = text.windows(key.len()).rposition(|w| w == key);
-    let text = &text[at.ok_or(SummaryError::Older(None))? + key.len()..];
+    let text = &text[at.ok_or(ResultsError::OtherVersion(None))? + key.len()..];
     let mut reader = serde_json::Deserializer::from_slice(text);
-    Summary::deserialize(&mut reader).map_err(|e| SummaryError::Older(Some(e)))
+    Ok(Summary::deserialize(&mut reader).map_err(|e| ResultsError::OtherVersion(Some(e)))?)
 }

@@ -113,7 +113,10 @@ fn presses(p: &PressTally, sync: u64) {
 }
 
 fn analysis(analysis: &Analysis) {
-    let name = analysis.name.as_deref().unwrap_or("official");
+    let name = analysis
+        .name
+        .as_deref()
+        .unwrap_or(skinrig_catalogue::OFFICIAL);
     let (rmse, faults, changes, version) = match &analysis.found {
         AnalysisContent::Trouble { trouble } => {
             outln!("analysis   {name}  {trouble}");
