@@ -174,6 +174,9 @@ fn print(plan: &PowerPlan, others: usize, session: &Path) {
         "  {} % of the variance between locations taken as common to both skins (--common)",
         shown(100.0 * common)
     );
+    outln!(
+        "  what changes from mounting to mounting is not known from one session: record each skin at least three times"
+    );
 }
 
 /// A percentage without the rounding errors of its binary form.

@@ -11,7 +11,8 @@ use crate::metrics::Metric;
 use crate::no_result::NoResult;
 use crate::subject::{Session, Subject};
 use skinrig_statistics::{
-    AlphaSpending, ComparisonTarget, Interval, Outlook, Sample, Settings, Verdict, compare,
+    AlphaSpending, ComparisonTarget, Interval, Outlook, Sample, SampleFault, Settings, Verdict,
+    compare,
 };
 
 /// One look at the data: the first repetitions of both skins, as many of each.
@@ -89,9 +90,13 @@ pub(crate) fn look(
         let chosen = first_repetitions(subjects, number);
         let locations = Locations::of(&chosen);
         let samples = chosen.each_ref().map(|s| {
-            let presses = locations.attempts(s);
-            let errors = presses.filter_map(|p| Some((p.location, p.error_mm()?)));
-            Sample::rms(errors)
+            let sample = |s: &Subject| {
+                let presses = locations.attempts(s);
+                Sample::rms(presses.filter_map(|p| Some((p.location, p.error_mm()?))))
+            };
+            let sessions = s.by_session();
+            let sessions = sessions.iter().map(sample).collect::<Result<Vec<_>, _>>()?;
+            Ok::<_, SampleFault>(sample(s)?.of_sessions(sessions))
         });
         let found = match samples {
             [Ok(a), Ok(b)] => compare(&a, &b, &question, &own).map_err(NoResult::from),

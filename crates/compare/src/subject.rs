@@ -101,6 +101,19 @@ impl Subject {
         self.sessions.iter().map(value).collect()
     }
 
+    /// The skin as each of its sessions has it; nothing for a single session.
+    pub(crate) fn by_session(&self) -> Vec<Self> {
+        if self.sessions.len() < 2 {
+            return Vec::new();
+        }
+        let alone = |session: &Session| Self {
+            letter: self.letter,
+            name: self.name.clone(),
+            sessions: vec![session.clone()],
+        };
+        self.sessions.iter().map(alone).collect()
+    }
+
     /// Outline of the skin in the first session.
     pub(crate) fn outline(&self) -> Option<&SkinOutline> {
         self.sessions.first().map(|s| &s.analysis.rig.outline)

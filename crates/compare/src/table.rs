@@ -68,11 +68,17 @@ pub(crate) fn table(
     settings: &Settings,
 ) -> Vec<Row> {
     let area_mm2 = area_mm2(subjects);
+    let by_session: Vec<Vec<Subject>> = subjects.iter().map(Subject::by_session).collect();
     let row = |metric: Metric| {
         let margin = margins.iter().find(|(m, _)| *m == metric).map(|m| m.1);
         let samples: Vec<_> = subjects
             .iter()
-            .map(|s| metric.sample(s, locations, within_mm, area_mm2))
+            .zip(&by_session)
+            .map(|(subject, sessions)| {
+                let sample = |s: &Subject| metric.sample(s, locations, within_mm, area_mm2);
+                let sessions = sessions.iter().map(sample).collect::<Result<Vec<_>, _>>()?;
+                Ok(sample(subject)?.of_sessions(sessions))
+            })
             .collect();
         let values = samples.iter().map(|sample| {
             let value = match sample {

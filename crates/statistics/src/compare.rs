@@ -7,6 +7,7 @@ use super::influence::Measure;
 use super::measure::measure;
 use super::question::{ComparisonTarget, ImprovementDirection, Pairing, Settings};
 use super::sample::{Data, Kind, Sample};
+use super::sessions::SessionSpread;
 use super::spread::RepeatEstimator;
 use super::{components, notes, presses_needed};
 
@@ -50,8 +51,9 @@ pub fn compare(
         return Err(ComparisonError::Kinds { a, b });
     }
     let data = [a.data(), b.data()];
-    let (of, left_out) = measured(data, settings.pairing)?;
-    let difference = Inference::difference(&of[0], &of[1], 1.0, settings);
+    let (of, left_out, sessions) = measured([a, b], settings.pairing)?;
+    let both = [&of[0], &of[1]];
+    let difference = Inference::difference(both, 1.0, sessions, settings);
     let whole = difference.interval(settings.alpha);
     if whole.low.is_some() && whole.low == whole.high {
         return Err(ComparisonError::NoSpread {
@@ -69,7 +71,7 @@ pub fn compare(
         if question.better == ImprovementDirection::NearerZero && a.kind() == Kind::Mean {
             p_of_distance(
                 &difference,
-                &Inference::difference(&of[0], &of[1], -1.0, settings),
+                &Inference::difference(both, -1.0, sessions, settings),
             )
         } else {
             2.0 * difference.p_above(0.0).min(difference.p_below(0.0))
@@ -77,7 +79,7 @@ pub fn compare(
         .min(1.0);
     let values = [of[0].value, of[1].value];
     let verdict = verdict(values, p_difference, tost.map(|t| t.p), question, settings);
-    let components = components::of(&of, settings.pairing);
+    let components = components::of(&of, settings.pairing, sessions);
     Ok(Comparison {
         kind: a.kind(),
         a: alone(a, &of[0], settings),
@@ -128,11 +130,12 @@ fn p_of_distance(difference: &Inference, sum: &Inference) -> f64 {
     2.0 * further.min(nearer)
 }
 
-/// Measures both samples, and counts the locations that each leaves out.
+/// Measures both samples, counts the locations that each leaves out, and how their sessions differ.
 fn measured(
-    data: [&Data; 2],
+    samples: [&Sample; 2],
     pairing: Pairing,
-) -> Result<([Measure; 2], [u32; 2]), ComparisonError> {
+) -> Result<([Measure; 2], [u32; 2], Option<SessionSpread>), ComparisonError> {
+    let data = samples.map(Sample::data);
     let estimator = RepeatEstimator::for_samples(data);
     let sets = data.map(Data::locations);
     for (side, set) in [Side::A, Side::B].into_iter().zip(&sets) {
@@ -161,5 +164,15 @@ fn measured(
         measure(data[0], estimator, Side::A, keep(1))?,
         measure(data[1], estimator, Side::B, keep(0))?,
     ];
-    Ok((of, left_out))
+    // A session in which the metric has no value tells nothing of the spread.
+    let by_session = [0, 1].map(|i| {
+        let keep = keep(1 - i);
+        let values = samples[i].sessions().iter().filter_map(|session| {
+            let of = measure(session, estimator, Side::A, &keep).ok()?;
+            Some(of.value).filter(|value| value.is_finite())
+        });
+        values.collect::<Vec<f64>>()
+    });
+    let sessions = SessionSpread::of(by_session.each_ref().map(Vec::as_slice));
+    Ok((of, left_out, sessions))
 }

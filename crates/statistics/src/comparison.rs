@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::question::{ImprovementDirection, Pairing};
+use super::sessions::SessionSpread;
 use super::{Kind, Side};
 
 /// A value with its 1 - alpha interval.
@@ -64,6 +65,8 @@ pub struct Components {
     pub within: Option<[f64; 2]>,
     /// Harmonic mean of repetitions per location, of A and B.
     pub repetitions: [f64; 2],
+    /// Between sessions; `None` with one of each, whose mounting, light and calibration count as the skin's.
+    pub sessions: Option<SessionSpread>,
 }
 
 /// Presses required for a decision, if the measured difference is the true one.
@@ -74,6 +77,13 @@ pub enum PressesNeeded {
     Nothing,
     /// This design would decide with the power of the settings.
     More(RequiredDesign),
+    /// Presses alone would not decide: so many sessions of each skin would, with the present presses in each.
+    Sessions {
+        /// Verdict that they would reach.
+        towards: Verdict,
+        /// Sessions of each skin.
+        each: u32,
+    },
     /// The difference is too close to the border for any practical number of presses.
     OutOfReach,
     /// The values do not vary, as when every press was located, so the required number of presses

@@ -1,12 +1,17 @@
 //! Variance components of a difference: between locations, and between repetitions at one location.
 
 use super::comparison::Components;
-use super::influence::Measure;
+use super::influence::{Measure, mean, variance};
 use super::question::Pairing;
+use super::sessions::SessionSpread;
 
 /// Variance components by the method of moments (analysis of variance with locations as groups; Searle, Casella and
 /// McCulloch 1992). A negative estimate between locations becomes 0.
-pub(super) fn of(samples: &[Measure; 2], pairing: Pairing) -> Components {
+pub(super) fn of(
+    samples: &[Measure; 2],
+    pairing: Pairing,
+    sessions: Option<SessionSpread>,
+) -> Components {
     let within = [within(&samples[0]), within(&samples[1])];
     let inverse = [0, 1].map(|i| inverse_repetitions(&samples[i]));
     let means = [means(&samples[0]), means(&samples[1])];
@@ -26,25 +31,21 @@ pub(super) fn of(samples: &[Measure; 2], pairing: Pairing) -> Components {
         between: (between - noise).max(0.0),
         within: within[0].zip(within[1]).map(|(a, b)| [a, b]),
         repetitions: inverse.map(|i| 1.0 / i),
+        sessions,
+    }
+}
+
+impl Components {
+    /// Standard error of the difference over so many locations, without what varies between sessions.
+    pub(super) fn error_over_locations(&self, locations: f64) -> f64 {
+        let within = self.within.unwrap_or_default();
+        let [a, b] = self.repetitions;
+        ((self.between + within[0] / a + within[1] / b) / locations).sqrt()
     }
 }
 
 fn means(of: &Measure) -> Vec<f64> {
     of.by_location.iter().map(|(_, u)| mean(u)).collect()
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-/// Sample variance; 0 for fewer than two values.
-pub(super) fn variance(values: &[f64]) -> f64 {
-    if values.len() < 2 {
-        return 0.0;
-    }
-    let centre = mean(values);
-    let squares: f64 = values.iter().map(|v| (v - centre).powi(2)).sum();
-    squares / (values.len() as f64 - 1.0)
 }
 
 /// Pooled variance between repetitions; `None` without repetitions.

@@ -5,12 +5,19 @@ use super::comparison::Interval;
 use super::influence::{BOOTSTRAP_FROM, InferenceData, Measure, Ratio, correlation, error};
 use super::mover::{Limits, mover_limits};
 use super::question::{Pairing, Settings};
+use super::sessions::SessionSpread;
 use crate::distributions::{student_cdf, student_quantile};
+
+/// Smallest p value that is found from limits, and halvings of its logarithm.
+const LEAST_P: f64 = 1e-15;
+const HALVINGS: u32 = 60;
 
 /// An estimate with its error model.
 pub(super) struct Inference {
     value: f64,
     method: IntervalMethod,
+    /// Widens the interval, if sessions can be told apart.
+    sessions: Option<SessionSpread>,
 }
 
 enum IntervalMethod {
@@ -92,12 +99,20 @@ impl Inference {
                 df,
             },
         };
-        let value = of.value;
-        Self { value, method }
+        Self {
+            value: of.value,
+            method,
+            sessions: None,
+        }
     }
 
     /// Inference for `b - sign * a`; `sign` is 1 or, for ratios only, -1.
-    pub(super) fn difference(a: &Measure, b: &Measure, sign: f64, settings: &Settings) -> Self {
+    pub(super) fn difference(
+        [a, b]: [&Measure; 2],
+        sign: f64,
+        sessions: Option<SessionSpread>,
+        settings: &Settings,
+    ) -> Self {
         let totals = [a.totals(), b.totals()];
         let value = b.value - sign * a.value;
         let (error, df) = spread(&totals, sign, settings.pairing);
@@ -130,12 +145,39 @@ impl Inference {
                 }
             }
         };
-        Self { value, method }
+        Self {
+            value,
+            method,
+            sessions,
+        }
     }
 
     /// Two-sided interval with coverage 1 - `alpha`.
     pub(super) fn interval(&self, alpha: f64) -> Interval {
-        let (low, high) = match &self.method {
+        let (low, high) = self.limits(alpha);
+        let finite = |v: f64| v.is_finite().then_some(v);
+        Interval {
+            value: self.value,
+            low: finite(low),
+            high: finite(high),
+        }
+    }
+
+    /// Its ends: distances from the value by locations and by sessions add up as independent errors (MOVER, Zou and Donner 2008).
+    fn limits(&self, alpha: f64) -> (f64, f64) {
+        let (low, high) = self.limits_over_locations(alpha);
+        let Some(sessions) = &self.sessions else {
+            return (low, high);
+        };
+        let (value, half) = (self.value, sessions.half_width(alpha));
+        (
+            value - half.hypot(value - low),
+            value + half.hypot(high - value),
+        )
+    }
+
+    fn limits_over_locations(&self, alpha: f64) -> (f64, f64) {
+        match &self.method {
             IntervalMethod::Student { error, df, scale } => {
                 let half = student_quantile(1.0 - 0.5 * alpha, *df);
                 scale.limits(self.value, *error, half)
@@ -154,17 +196,49 @@ impl Inference {
             IntervalMethod::Limits { of, df } => {
                 of.limits(self.value, student_quantile(1.0 - 0.5 * alpha, *df))
             }
-        };
-        let finite = |v: f64| v.is_finite().then_some(v);
-        Interval {
-            value: self.value,
-            low: finite(low),
-            high: finite(high),
         }
+    }
+
+    /// One-sided p value against a truth at `border` or beyond, as seen from the value: the level at which a limit is there, by
+    /// bisection. Above 1/2 if the value itself is beyond.
+    fn p_of_limits(&self, border: f64, is_above: bool) -> f64 {
+        let beyond = if is_above {
+            self.value <= border
+        } else {
+            self.value >= border
+        };
+        if beyond {
+            return if self.value == border {
+                0.5
+            } else {
+                1.0 - self.p_of_limits(border, !is_above)
+            };
+        }
+        let excludes = |p: f64| {
+            let (low, high) = self.limits(2.0 * p);
+            if is_above {
+                low > border
+            } else {
+                high < border
+            }
+        };
+        let (mut near, mut far) = (libm::log(LEAST_P), libm::log(0.5));
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (near + far);
+            if excludes(libm::exp(middle)) {
+                far = middle;
+            } else {
+                near = middle;
+            }
+        }
+        libm::exp(far)
     }
 
     /// One-sided p value against `truth <= border`: a lower tail, which keeps its digits however small it is.
     pub(crate) fn p_above(&self, border: f64) -> f64 {
+        if self.sessions.is_some() {
+            return self.p_of_limits(border, true);
+        }
         match &self.method {
             IntervalMethod::Student { error, df, scale } => {
                 student_cdf(-scale.above(self.value, *error, border), *df)
@@ -181,6 +255,9 @@ impl Inference {
 
     /// One-sided p value against `truth >= border`.
     pub(crate) fn p_below(&self, border: f64) -> f64 {
+        if self.sessions.is_some() {
+            return self.p_of_limits(border, false);
+        }
         match &self.method {
             IntervalMethod::Student { error, df, scale } => {
                 student_cdf(scale.above(self.value, *error, border), *df)

@@ -120,6 +120,20 @@ pub(super) fn error(totals: &[f64]) -> f64 {
     (k / (k - 1.0) * totals.iter().map(|e| e * e).sum::<f64>()).sqrt()
 }
 
+pub(super) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Sample variance; 0 for fewer than two values.
+pub(super) fn variance(values: &[f64]) -> f64 {
+    if values.len() < 2 {
+        return 0.0;
+    }
+    let centre = mean(values);
+    let squares: f64 = values.iter().map(|v| (v - centre).powi(2)).sum();
+    squares / (values.len() as f64 - 1.0)
+}
+
 /// Correlation of two sums over the same locations; 0 if one of them does not vary.
 pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

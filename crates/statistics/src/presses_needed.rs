@@ -39,18 +39,37 @@ pub(super) fn presses_needed(
     ];
     let now = of.each_ref().map(|i| i.by_location.len() as u32);
     let locations = now[0].min(now[1]);
-    let best = goals.iter().filter_map(|(towards, distance, i)| {
+    // Standard errors from the border, by degrees of freedom.
+    let times =
+        |i: usize, df: f64| student_quantile(tails[i], df) + student_quantile(powers[i], df);
+    let by_presses = goals.iter().filter_map(|(towards, distance, i)| {
         let distance = (*distance)?;
+        // More presses leave what varies between sessions.
+        let sessions = components.sessions;
+        let taken = sessions.map_or(0.0, |s| times(*i, s.df) * s.error());
         let need = |k: u32| {
-            let df = f64::from(k - 1);
-            let times = student_quantile(tails[*i], df) + student_quantile(powers[*i], df);
             // Largest variance per location that still decides.
-            f64::from(k) * (distance / times).powi(2)
+            let left = (distance * distance - taken * taken).max(0.0);
+            f64::from(k) * left / times(*i, f64::from(k - 1)).powi(2)
         };
         required_design(*towards, need, locations, components, of)
     });
-    best.min_by_key(|e| e.more_presses_by_locations)
-        .map_or(PressesNeeded::OutOfReach, PressesNeeded::More)
+    if let Some(best) = by_presses.min_by_key(|e| e.more_presses_by_locations) {
+        return PressesNeeded::More(best);
+    }
+    let by_sessions = goals.iter().filter_map(|(towards, distance, i)| {
+        let error = components.error_over_locations(f64::from(locations));
+        let rest = times(*i, f64::from(locations - 1)) * error;
+        let each = components
+            .sessions?
+            .enough((*distance)?, rest, |df| times(*i, df))?;
+        Some((*towards, each))
+    });
+    by_sessions
+        .min_by_key(|(_, each)| *each)
+        .map_or(PressesNeeded::OutOfReach, |(towards, each)| {
+            PressesNeeded::Sessions { towards, each }
+        })
 }
 
 fn required_design(
@@ -61,8 +80,7 @@ fn required_design(
     of: &[Measure; 2],
 ) -> Option<RequiredDesign> {
     let within = components.within.unwrap_or_default();
-    let [ra, rb] = components.repetitions;
-    let variance = components.between + within[0] / ra + within[1] / rb;
+    let variance = components.error_over_locations(1.0).powi(2);
     if allowed(MAX_LOCATIONS) < variance {
         return None;
     }

@@ -78,6 +78,8 @@ pub enum SampleFault {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     data: Data,
+    /// The same values by session; empty if they are not told apart.
+    sessions: Vec<Data>,
 }
 
 /// Values by location, sorted within each location so that input order does not matter.
@@ -111,15 +113,22 @@ impl Data {
     }
 }
 
+impl From<Data> for Sample {
+    fn from(data: Data) -> Self {
+        Self {
+            data,
+            sessions: Vec::new(),
+        }
+    }
+}
+
 impl Sample {
     /// Sample for a mean, from (location, value) of each press.
     ///
     /// # Errors
     /// [`SampleFault::NotFinite`].
     pub fn mean(values: impl IntoIterator<Item = (u32, f64)>) -> Result<Self, SampleFault> {
-        finite(values).map(|v| Self {
-            data: Data::Mean(v),
-        })
+        finite(values).map(|v| Data::Mean(v).into())
     }
 
     /// Sample for a root mean square, from (location, error) of each press. The error is its length for the RMSE, or a
@@ -128,7 +137,7 @@ impl Sample {
     /// # Errors
     /// [`SampleFault::NotFinite`].
     pub fn rms(values: impl IntoIterator<Item = (u32, f64)>) -> Result<Self, SampleFault> {
-        finite(values).map(|v| Self { data: Data::Rms(v) })
+        finite(values).map(|v| Data::Rms(v).into())
     }
 
     /// Sample for taxels, from (location, error length in mm) of each press and the area that the taxels cover, mm².
@@ -142,9 +151,7 @@ impl Sample {
         if !(area_mm2 > 0.0 && area_mm2.is_finite()) {
             return Err(SampleFault::Area(area_mm2));
         }
-        finite(errors_mm).map(|v| Self {
-            data: Data::Taxels(area_mm2, v),
-        })
+        finite(errors_mm).map(|v| Data::Taxels(area_mm2, v).into())
     }
 
     /// Sample for the std of repetitions, from (location, estimated position) of each located press. Drops series with one
@@ -169,9 +176,7 @@ impl Sample {
             *positions = series.filter(|s| s.len() > 1).flatten().copied().collect();
         }
         clusters.retain(|_, positions| !positions.is_empty());
-        Ok(Self {
-            data: Data::RepeatStd(clusters),
-        })
+        Ok(Data::RepeatStd(clusters).into())
     }
 
     /// Sample for a success rate, from (location, success) of each attempted press.
@@ -189,9 +194,7 @@ impl Sample {
             clusters.entry(location).or_default().push(success);
         }
         clusters.values_mut().for_each(|v| v.sort_unstable());
-        Self {
-            data: Data::Share(times.max(1), clusters),
-        }
+        Data::Share(times.max(1), clusters).into()
     }
 
     /// Sample for a median time, from (location, time) of each trial; `None` for a trial that was never detected.
@@ -201,9 +204,7 @@ impl Sample {
     pub fn median(
         times: impl IntoIterator<Item = (u32, Option<f64>)>,
     ) -> Result<Self, SampleFault> {
-        censored(times).map(|v| Self {
-            data: Data::Quantile(0.5, v),
-        })
+        censored(times).map(|v| Data::Quantile(0.5, v).into())
     }
 
     /// Sample for a 95th percentile, from (location, value) of each press.
@@ -214,9 +215,7 @@ impl Sample {
         values: impl IntoIterator<Item = (u32, f64)>,
     ) -> Result<Self, SampleFault> {
         let values = values.into_iter().map(|(location, v)| (location, Some(v)));
-        censored(values).map(|v| Self {
-            data: Data::Quantile(0.95, v),
-        })
+        censored(values).map(|v| Data::Quantile(0.95, v).into())
     }
 
     /// Sample for a 5-95 % width, from (location, time) of each trial; `None` for a trial that was never detected.
@@ -224,9 +223,7 @@ impl Sample {
     /// # Errors
     /// [`SampleFault::NotFinite`].
     pub fn width(times: impl IntoIterator<Item = (u32, Option<f64>)>) -> Result<Self, SampleFault> {
-        censored(times).map(|v| Self {
-            data: Data::Width(v),
-        })
+        censored(times).map(|v| Data::Width(v).into())
     }
 
     /// Sample for a count rate, from (location, count) of each exposure.
@@ -248,9 +245,20 @@ impl Sample {
                 by.then(a.exposure.total_cmp(&b.exposure))
             });
         }
-        Ok(Self {
-            data: Data::CountRate(clusters),
-        })
+        Ok(Data::CountRate(clusters).into())
+    }
+
+    /// Tells apart the sessions of the values: one sample of the same kind for each. Differences then include what varies between
+    /// sessions.
+    #[must_use]
+    pub fn of_sessions(mut self, sessions: impl IntoIterator<Item = Self>) -> Self {
+        self.sessions = sessions.into_iter().map(|session| session.data).collect();
+        self
+    }
+
+    /// The values by session.
+    pub(super) fn sessions(&self) -> &[Data] {
+        &self.sessions
     }
 
     /// Kind of the sample.

@@ -91,15 +91,22 @@ impl AlphaSpending {
         // Presses at a location per repetition: several depths are pressed in each.
         let each = last.components.repetitions.map(|r| r / f64::from(look));
         let apart = last.difference.value.abs();
+        // Repetitions leave what varies between sessions.
+        let sessions = |p: &dyn Fn(f64) -> f64| {
+            let spread = last.components.sessions;
+            spread.map_or(0.0, |s| p(s.df) * s.error())
+        };
         let room = last.tost.map_or(0.0, |t| t.margin - apart);
         let decides = |future: u32| {
             let alpha = self.at(settings.alpha, future);
             let noise = within[0] / each[0] + within[1] / each[1];
             let error = ((last.components.between + noise / f64::from(future)) / locations).sqrt();
-            let t = |p: f64| student_quantile(p, locations - 1.0);
-            let differs = t(1.0 - 0.5 * alpha) + t(settings.power);
-            let equals = t(1.0 - alpha) + t(0.5 * (1.0 + settings.power));
-            apart >= differs * error || room >= equals * error
+            let reach = |level: f64, power: f64| {
+                let t = |df: f64| student_quantile(level, df) + student_quantile(power, df);
+                (t(locations - 1.0) * error).hypot(sessions(&t))
+            };
+            apart >= reach(1.0 - 0.5 * alpha, settings.power)
+                || room >= reach(1.0 - alpha, 0.5 * (1.0 + settings.power))
         };
         let found = (look + 1..=most).find(|future| decides(*future));
         found.map_or(Outlook::NotByRepetitions, |future| Outlook::More {

@@ -25,6 +25,7 @@ pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference
     found.extend(check_locations(subjects, locations));
     found.extend(check_duplicates(subjects));
     found.extend(check_seeds(subjects));
+    found.extend(check_mounting(subjects));
     found.extend(check_unsealed(subjects));
     found.extend(check_plausible(subjects));
     found.extend(ambient(subjects, locations));
@@ -339,6 +340,22 @@ fn check_seeds(subjects: &[Subject]) -> Option<Difference> {
         difference(
             "same-seed",
             "seed of the simulation",
+            Severity::Confounding,
+            values,
+            reason,
+        )
+    })
+}
+
+/// Reports skins with one session each: nothing tells how much a session differs from the next of the same skin.
+fn check_mounting(subjects: &[Subject]) -> Option<Difference> {
+    let alone = subjects.iter().all(|s| s.sessions.len() == 1);
+    alone.then(|| {
+        let values = subjects.iter().map(|_| "one".to_owned()).collect();
+        let reason = "mounting, light and calibration count as the skin's; record each skin again, mounted anew";
+        difference(
+            "mounting",
+            "sessions",
             Severity::Confounding,
             values,
             reason,

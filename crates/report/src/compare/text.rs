@@ -66,6 +66,10 @@ pub(super) fn needed(of: &Comparison) -> Option<String> {
         PressesNeeded::Unknown => {
             Some("the values do not vary: nothing tells how many presses would decide".to_owned())
         }
+        PressesNeeded::Sessions { towards, each } => Some(format!(
+            "if the measured difference is real, {each} sessions of each skin, mounted anew, would show `{}`; more presses in these would not",
+            verdict(Some(towards))
+        )),
         PressesNeeded::More(enough) => {
             let mut text = format!(
                 "if the measured difference is real, {} locations in total ({} more presses per skin) would show `{}`",

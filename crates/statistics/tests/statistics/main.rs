@@ -8,4 +8,5 @@ mod populations;
 mod power;
 mod refusals;
 mod sequential;
+mod sessions;
 mod stopping;
