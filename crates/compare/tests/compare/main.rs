@@ -1,3 +1,4 @@
-//! Tests of comparisons: causes of differences.
+//! Tests of comparisons: causes of differences, skins with several sessions.
 
 mod causes;
+mod sessions;

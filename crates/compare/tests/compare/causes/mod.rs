@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 #![expect(clippy::print_stdout, reason = "shows pairs with a wrong cause")]
 
-mod planted;
+pub(crate) mod planted;
 
 use planted::{PlantedCause, record};
 use skinrig_analysis::result::{CameraMove, EarlierSession, Move, Recalibration};

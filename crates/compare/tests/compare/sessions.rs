@@ -1,0 +1,51 @@
+//! Skins with one and with several sessions.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use skinrig_compare::{Comparison, ComparisonOptions, Subject, compare};
+
+use crate::causes::planted::{PlantedCause, record};
+
+/// A skin with these sessions.
+fn skin(letter: char, sessions: &[&Subject]) -> Subject {
+    Subject {
+        letter,
+        name: letter.to_string(),
+        sessions: sessions.iter().flat_map(|s| s.sessions.clone()).collect(),
+    }
+}
+
+/// Sessions of A and B behind the spread between sessions, by metric; `None` if it is unknown.
+fn sessions(of: &Comparison) -> Vec<Option<[u32; 2]>> {
+    let compared = of.table.iter().filter_map(|row| {
+        let found = row.against_first.first().unwrap().comparison.as_ref()?;
+        Some(found.components.sessions.map(|s| s.sessions))
+    });
+    compared.collect()
+}
+
+#[test]
+fn sessions_of_each_skin_are_told_apart() {
+    let [one, two, three, four] =
+        [1, 2, 3, 4].map(|seed| record(seed, PlantedCause::Nothing).skin('A', None));
+    let [one, two, three, four] = [&one, &two, &three, &four];
+    let compared = |a: &[&Subject], b: &[&Subject]| {
+        let options = ComparisonOptions::default();
+        compare(&[skin('A', a), skin('B', b)], &vec![None], &options)
+    };
+    let is_confounded = |of: &Comparison| of.differences.iter().any(|d| d.key == "mounting");
+
+    let single = compared(&[one], &[three]);
+    assert!(is_confounded(&single), "{:#?}", single.differences);
+    assert!(sessions(&single).iter().all(Option::is_none));
+
+    for (a, b, expected) in [
+        (&[one, two][..], &[three, four][..], [2, 2]),
+        (&[one], &[two, three, four], [1, 3]),
+    ] {
+        let several = compared(a, b);
+        assert!(!is_confounded(&several), "{:#?}", several.differences);
+        let found = sessions(&several);
+        assert!(found.len() > 5, "{found:?}");
+        assert!(found.iter().all(|s| *s == Some(expected)), "{found:?}");
+    }
+}
