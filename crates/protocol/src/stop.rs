@@ -22,7 +22,7 @@ pub(crate) struct StopKeys {
     #[setting(above = 0.0, max = 1000.0)]
     pub target_mm: Option<f64>,
     /// Probability that the interval of any look misses the true value. Each look spends an equal share.
-    #[setting(default = "5 %", min = 0.01, max = 50.0)]
+    #[setting(default = "5 %", min = 0.01, max = 49.0)]
     pub alpha_percent: f64,
     /// The scored repetitions after which to look; each one when absent. Fewer looks have narrower intervals.
     pub looks: Option<Numbers>,

@@ -236,12 +236,7 @@ pub(crate) struct RmseAtLook {
 #[must_use]
 pub(crate) fn rmse_at_look(analysis: &Analysis) -> Option<RmseAtLook> {
     let campaign = analysis.campaign.as_ref()?;
-    let look = campaign.of_rmse()?;
-    // After a look that could not be taken, an earlier one stands for fewer presses than were made.
-    let is_latest = campaign.decided.is_some() || look.presses == analysis.scored.rmse_mm.n;
-    if !is_latest {
-        return None;
-    }
+    let look = campaign.of_rmse(&analysis.scored.rmse_mm)?;
     let end = |mm: Option<f64>| mm.map_or_else(|| "open".to_owned(), |mm| number(Some(mm), 2));
     Some(RmseAtLook {
         value: number(Some(look.value_mm), 2),

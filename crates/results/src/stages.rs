@@ -112,6 +112,11 @@ impl AlignedSession {
         let end = self.session.reader.end()?.map(|(_, end)| end);
         let plan_json = &self.session.header.plan_json;
         let campaign = campaign::looks(&analysis, plan_json, end.as_ref())?;
+        // The data chose the number of presses: the usual interval would cover less often than it says.
+        let rmse_mm = &mut analysis.scored.rmse_mm;
+        if let Some(look) = campaign.as_ref().and_then(|c| c.of_rmse(rmse_mm)) {
+            (rmse_mm.low, rmse_mm.high) = (look.low_mm, look.high_mm);
+        }
         analysis.warnings.extend(campaign.as_ref().map(|found| {
             let (looks, declared) = (found.looks.len(), found.declared);
             Warning::from(match found.decided {

@@ -68,6 +68,16 @@ pub enum HistoryError {
         /// Name of the bench.
         rig: String,
     },
+    /// A night that has just ended is dated before one that the history has.
+    #[error("{}: expected a night after {newest}, the newest one there, found one of {started}: the clock of this computer went back, or was ahead before; a night of an earlier date joins the reference instead of being judged", path.display())]
+    DatedEarlier {
+        /// The file.
+        path: PathBuf,
+        /// Start of the night.
+        started: String,
+        /// Start of the newest night in the history.
+        newest: String,
+    },
     /// The history does not contain the requested night or series.
     #[error("{}: expected {expected}, found {found}", path.display())]
     NotFound {

@@ -91,6 +91,32 @@ pub fn append(path: &Path, night: &Night, folder: &Path) -> Result<AppendOutcome
     })
 }
 
+/// Adds the night that has just ended, which is the newest of its suite and bench.
+///
+/// # Errors
+/// Those of [`append`]; [`HistoryError::DatedEarlier`] if the history has a later night.
+pub fn append_newest(
+    path: &Path,
+    night: &Night,
+    folder: &Path,
+) -> Result<AppendOutcome, HistoryError> {
+    let known = match suites(path) {
+        Err(HistoryError::Missing { .. }) => Vec::new(),
+        known => known?,
+    };
+    let own = known.into_iter().find(|line| {
+        (&line.rig, &line.rig_kind, &line.suite) == (&night.rig, &night.rig_kind, &night.suite)
+    });
+    match own {
+        Some(line) if line.newest > night.started => Err(HistoryError::DatedEarlier {
+            path: path.to_owned(),
+            started: night.started.clone(),
+            newest: line.newest,
+        }),
+        _ => append(path, night, folder),
+    }
+}
+
 /// Whether the rows of a night are those of its JSON. The folder may have moved; SQLite has no NaN, and infinity is not a measurement.
 fn is_same((stored, series): &(NightSummary, Vec<Series>), night: &Night) -> bool {
     let mut one = History::default();

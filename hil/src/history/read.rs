@@ -26,6 +26,7 @@ pub(super) async fn suites(conn: &mut SqliteConnection) -> Result<Vec<SuiteNight
                 rig_kind: row.try_get("rig_kind")?,
                 suite: row.try_get("suite")?,
                 nights: number(row, "nights")?,
+                newest: row.try_get("newest")?,
             })
         })
         .collect()

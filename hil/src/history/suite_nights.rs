@@ -11,4 +11,6 @@ pub struct SuiteNights {
     pub suite: String,
     /// Number of nights.
     pub nights: usize,
+    /// Start of the newest, RFC 3339, UTC.
+    pub newest: String,
 }

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::{Look, StopMetric, StopQuestion};
 
+use super::Estimate;
+
 /// Looks of a campaign that ends by itself. Its presses were counted until the data decided, so an interval at the usual
 /// level covers less often than it says; those of the looks hold together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,9 +22,12 @@ pub struct CampaignLooks {
 }
 
 impl CampaignLooks {
-    /// The look whose interval the RMSE has, if the campaign asks about it.
+    /// The look whose interval the RMSE has: the last one, if the campaign asks about this metric and the look is of these presses.
     #[must_use]
-    pub fn of_rmse(&self) -> Option<&Look> {
-        self.looks.last().filter(|l| l.metric == StopMetric::Rmse)
+    pub fn of_rmse(&self, rmse_mm: &Estimate) -> Option<&Look> {
+        let look = self.looks.last()?;
+        // After a look that could not be taken, an earlier one stands for fewer presses than were made.
+        let is_latest = self.decided.is_some() || look.presses == rmse_mm.n;
+        (look.metric == StopMetric::Rmse && is_latest).then_some(look)
     }
 }

@@ -83,7 +83,7 @@ use crate::rule::Rule;
 /// estimated depth treats ON and OFF alike, and intervals are wider for few locations. Version 16: a depth that presses stopped short of has no
 /// errors of its own. Version 19: a place that a plan lists again is one location. Version
 /// 20: a look needs half of the presses, and an open question is a warning.
-pub const ANALYSIS_VERSION: u32 = 22;
+pub const ANALYSIS_VERSION: u32 = 23;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -120,6 +120,7 @@ pub struct Analysis {
     #[serde(default)]
     pub indentation: Option<Indentation>,
     /// Metrics over the valid, not excluded scored presses.
+    /// The interval of the RMSE of a campaign that ends by itself is that of its last look, at the level of that look.
     pub scored: Metrics,
     /// Metrics over all scored presses with an estimate, ignoring exclusions.
     pub scored_without_exclusions: Metrics,

@@ -112,13 +112,28 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
     let mut night_files: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
     night_files.retain(|json| json.is_file());
     night_files.sort();
-    let (mut new, mut known, mut skipped) = (0, 0, 0);
+    let before = match history::suites(path) {
+        Err(HistoryError::Missing { .. }) => Vec::new(),
+        found => found.map_err(Failure::input)?,
+    };
+    let is_earlier = |night: &Night| {
+        before.iter().any(|s| {
+            (&s.rig, &s.rig_kind, &s.suite) == (&night.rig, &night.rig_kind, &night.suite)
+                && night.started < s.newest
+        })
+    };
+    let (mut new, mut earlier, mut known, mut skipped) = (0, 0, 0, 0);
     for json in &night_files {
         let night = history::read_night(json);
         let home = json.parent().unwrap_or(nights);
-        match night.and_then(|night| history::append(path, &night, home)) {
-            Ok(AppendOutcome::Added) => new += 1,
-            Ok(AppendOutcome::AlreadyPresent) => known += 1,
+        let added =
+            night.and_then(|night| Ok((history::append(path, &night, home)?, is_earlier(&night))));
+        match added {
+            Ok((AppendOutcome::Added, is_earlier)) => {
+                new += 1;
+                earlier += usize::from(is_earlier);
+            }
+            Ok((AppendOutcome::AlreadyPresent, _)) => known += 1,
             Err(
                 e @ (HistoryError::InvalidNight { .. } | HistoryError::ConflictingNight { .. }),
             ) => {
@@ -136,6 +151,13 @@ fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
         )));
     }
     errln!("{new} nights added, {known} already present, {skipped} skipped");
+    if earlier > 0 {
+        errln!(
+            "warning: {earlier} of them started before nights that the history had already: they join the reference and are not judged as new\n  \
+             next: if the clock of the computer was wrong, delete {0} and rebuild it without their folders",
+            path.display()
+        );
+    }
     if new + known == 0 {
         return Err(Failure::input(format!(
             "--rebuild: {}: expected finished nights, found none; see the warnings above",
@@ -182,7 +204,7 @@ impl NightTrends {
 
 /// Adds a night, whose files are in `home`, to the history at `path`, and judges all nights up to it.
 pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<NightTrends, HistoryError> {
-    history::append(path, night, home)?;
+    history::append_newest(path, night, home)?;
     let filter = Filter {
         rig: Some(night.rig.clone()),
         suite: Some(night.suite.clone()),

@@ -343,6 +343,20 @@ fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
         .expect_stderr(&["simulation level", "sim-level", "scored presses that count"]);
 }
 
+/// The skins have other locations besides: their numbers of presses say nothing of what is compared.
+#[test]
+fn the_number_of_shared_locations_is_told() {
+    let lab = Lab::new();
+    let a = record(&lab, "a", "1", &[]);
+    let places = "path.points=[[10 mm, 2 mm], [-10 mm, 18 mm], [2 mm, -16 mm], [23 mm, 15 mm]]";
+    let b = record(&lab, "b", "2", &["--set", places]);
+    let told = skinrig(&["compare", &a, &b]).code(0);
+    let shared = "compared  2 shared locations alone: ";
+    assert!(told.out.contains(shared), "{told:#?}");
+    let same = skinrig(&["compare", &a, &a, "--despite", "same-session"]);
+    assert!(!same.out.contains("compared  "), "{same:#?}");
+}
+
 #[test]
 fn other_places_are_blocking_and_then_independent() {
     let lab = Lab::new();

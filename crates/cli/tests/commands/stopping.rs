@@ -66,6 +66,14 @@ fn a_campaign_ends_with_the_look_that_decides() {
         campaign["looks"][0]["value_mm"],
         found["analysis"]["scored"]["rmse_mm"]["value"]
     );
+    // Everything that reads the RMSE has the interval of the look.
+    let rmse = &found["analysis"]["scored"]["rmse_mm"];
+    assert_eq!(
+        (&rmse["low"], &rmse["high"]),
+        (&look["low_mm"], &look["high_mm"])
+    );
+    let ranked = skinrig(&["prototypes", &lab.text("s"), "--json"]).code(0);
+    assert_eq!(ranked.json()[0]["series"][0]["last"], *rmse);
     assert_eq!(found["analysis"]["counts"]["missed"], 8);
     let page = std::fs::read_to_string(only(&lab.path("s"), ".report.html")).unwrap();
     assert!(page.contains("98.3 % interval") && page.contains("at look 1 of 3"));

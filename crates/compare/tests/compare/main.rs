@@ -1,4 +1,5 @@
-//! Tests of comparisons: causes of differences, skins with several sessions.
+//! Tests of comparisons: causes of differences, skins with several sessions, table and map.
 
 mod causes;
 mod sessions;
+mod table;

@@ -146,8 +146,8 @@ fn a_wrong_stop_is_explained_at_its_place() {
         &["stop.looks", "counting starts at 1"],
     );
     refused(
-        "stop: {target: 1 mm, alpha: 60 %}",
-        &["stop.alpha", "at most 50"],
+        "stop: {target: 1 mm, alpha: 50 %}",
+        &["stop.alpha", "at most 49"],
     );
     refused(
         "stop: {target: 1 mm, metric: bias}",

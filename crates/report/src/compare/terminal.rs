@@ -42,20 +42,44 @@ fn verdicts(result: &Comparison) -> Section {
         ),
     };
     let others = result.skins.iter().enumerate().skip(1);
-    section.with_all(others.filter_map(|(k, skin)| {
-        let found = result
-            .headline()?
-            .against_first
-            .iter()
-            .find(|a| a.subject == k)?;
-        let text = format!(
-            "{} against A: {}. {}{doubts}",
-            skin.letter,
-            text::verdict(found.verdict),
-            text::headline(result, found)
-        );
-        Some(Note::new("VERDICT", text).tone(Tone::Answer))
-    }))
+    section
+        .with_all(others.filter_map(|(k, skin)| {
+            let found = result
+                .headline()?
+                .against_first
+                .iter()
+                .find(|a| a.subject == k)?;
+            let text = format!(
+                "{} against A: {}. {}{doubts}",
+                skin.letter,
+                text::verdict(found.verdict),
+                text::headline(result, found)
+            );
+            Some(Note::new("VERDICT", text).tone(Tone::Answer))
+        }))
+        .with_all(shared(result))
+}
+
+/// Locations behind the verdicts, where a skin has others that do not count.
+fn shared(result: &Comparison) -> Vec<Note> {
+    let rows = result
+        .headline()
+        .into_iter()
+        .flat_map(|row| &row.against_first);
+    let partly = rows.filter_map(|found| {
+        let design = found.comparison.as_ref()?.design;
+        let letter = result.skins.get(found.subject)?.letter;
+        let [locations, _] = design.locations;
+        let [a, b] = design.presses;
+        (design.left_out != [0, 0]).then(|| {
+            let text = format!(
+                "{} alone: {a} presses of A, {b} of {letter}",
+                text::counted(locations as usize, "shared location")
+            );
+            Note::new("compared", text).warning()
+        })
+    });
+    partly.collect()
 }
 
 /// Conclusion and looks of a sequential comparison.

@@ -423,6 +423,23 @@ fn a_night_tells_of_its_verdict_and_of_the_alarms_that_it_raised() {
         .expect_stderr(&["0 nights added, 2 already present, 0 skipped"]);
 }
 
+/// A clock that went back must not turn tonight into a part of the reference, and yesterday into the newest night.
+#[test]
+fn nights_that_are_dated_before_others_are_not_taken_for_the_newest() {
+    let nights = Nights::of(15, 15);
+    nights.add_dated("2099-01-01");
+    let (ran, folder) = nights.run(&["--history", &nights.history]);
+    let dated = "the newest one there, found one of";
+    ran.code(0)
+        .expect_stderr(&["no trends for this night", "2099-01-01T02:00:00Z", dated]);
+    assert_contains(&read(&folder.join("night.html")), &[dated]);
+    let all = nights.lab.text("nights");
+    nights.trend(&["--rebuild", &all]).expect_stderr(&[
+        "1 nights added, 0 already present, 0 skipped",
+        "1 of them started before nights that the history had already",
+    ]);
+}
+
 #[test]
 fn a_night_without_trends_gives_the_reason_and_is_still_judged() {
     let nights = Nights::of(10, 10);

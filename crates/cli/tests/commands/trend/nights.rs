@@ -145,6 +145,16 @@ impl Nights {
         }
     }
 
+    /// A night of this day, YYYY-MM-DD.
+    pub(super) fn add_dated(&self, day: &str) {
+        let dated = Night {
+            id: format!("{day}T02-00-00Z-small"),
+            started: format!("{day}T02:00:00Z"),
+            ..night(0, None, &[("disk", "computer", "write_rate", "B/s", 1e15)])
+        };
+        self.append(&dated);
+    }
+
     /// Adds a night with its page to the history; returns its folder.
     fn append(&self, night: &Night) -> PathBuf {
         let home = self.lab.path("nights").join(&night.id);

@@ -1,0 +1,208 @@
+//! The table and the map of a comparison against the presses themselves.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use skinrig_analysis::result::{PressResult, PressView};
+use skinrig_compare::{Comparison, ComparisonOptions, Metric, Row, Subject, compare};
+use skinrig_model::{PressRole, Verdict};
+
+use crate::causes::planted::{PlantedCause, record};
+
+const WITHIN_MM: f64 = 0.1;
+
+fn scored(of: &Subject) -> impl Iterator<Item = &PressResult> {
+    let presses = of.sessions.iter().flat_map(|s| &s.analysis.presses);
+    presses.filter(|p| p.role == PressRole::Score)
+}
+
+fn errors(of: &Subject) -> Vec<(f64, f64)> {
+    scored(of).map(|p| p.error_mm().unwrap()).collect()
+}
+
+fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, n) = values
+        .into_iter()
+        .fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+    sum / n
+}
+
+fn both_views(of: &Subject, value: fn(&PressView) -> f64) -> f64 {
+    mean(scored(of).map(|p| p.views.iter().flatten().map(value).sum::<f64>()))
+}
+
+/// Mean over locations of the standard deviation of two repetitions, per axis.
+fn repeat_std(of: &Subject) -> f64 {
+    let presses: Vec<_> = scored(of).collect();
+    let half = presses.len() / 2;
+    let (first, second) = presses.split_at(half);
+    mean(first.iter().zip(second).map(|(a, b)| {
+        assert_eq!(a.location, b.location);
+        let (a, b) = (a.estimate().unwrap(), b.estimate().unwrap());
+        let square = |d: f64| d * d / 2.0;
+        ((square(a.x_mm - b.x_mm) + square(a.y_mm - b.y_mm)) / 2.0).sqrt()
+    }))
+}
+
+fn compared(a: &Subject, b: &Subject) -> Comparison {
+    let options = ComparisonOptions {
+        within_mm: Some(WITHIN_MM),
+        ..ComparisonOptions::default()
+    };
+    compare(&[a.clone(), b.clone()], &vec![None], &options)
+}
+
+fn row(of: &Comparison, metric: Metric) -> &Row {
+    of.table.iter().find(|r| r.metric == metric).unwrap()
+}
+
+fn is_near(found: f64, expected: f64) -> bool {
+    (found - expected).abs() <= 1e-9 * expected.abs().max(1e-3)
+}
+
+#[test]
+fn the_values_of_a_skin_are_those_of_its_presses() {
+    let (a, b) = (
+        record(1, PlantedCause::Nothing).skin('A', None),
+        record(2, PlantedCause::Signal(0.5)).skin('B', None),
+    );
+    let found = compared(&a, &b);
+    for (k, subject) in [&a, &b].into_iter().enumerate() {
+        let errors = errors(subject);
+        let square = |of: fn(&(f64, f64)) -> f64| mean(errors.iter().map(of)).sqrt();
+        let rmse = square(|e| e.0 * e.0 + e.1 * e.1);
+        let settings = &subject.sessions[0].analysis.settings;
+        let rate = both_views(subject, |v| v.rate_per_s);
+        let share = mean(
+            errors
+                .iter()
+                .map(|e| f64::from(u8::from(e.0.hypot(e.1) <= WITHIN_MM))),
+        );
+        for (metric, expected) in [
+            (Metric::Rmse, rmse),
+            (Metric::RmseX, square(|e| e.0 * e.0)),
+            (Metric::RmseY, square(|e| e.1 * e.1)),
+            (Metric::BiasX, mean(errors.iter().map(|e| e.0))),
+            (Metric::BiasY, mean(errors.iter().map(|e| e.1))),
+            (Metric::LocatedRate, 1.0),
+            (Metric::WithinRate, share),
+            (
+                Metric::IdleEvents,
+                both_views(subject, |v| v.idle_rate_per_s),
+            ),
+            (Metric::PressEvents, rate),
+            (Metric::PressBytes, rate * settings.bits_per_event / 8.0),
+        ] {
+            let value = row(&found, metric).values[k].value.unwrap().value;
+            assert!(
+                is_near(value, expected),
+                "{metric:?}: {value}, not {expected}"
+            );
+        }
+        let std = row(&found, Metric::RepeatStd).values[k]
+            .value
+            .unwrap()
+            .value;
+        assert!((0.5..2.0).contains(&(std / repeat_std(subject))), "{std}");
+        let taxels = |k: usize| row(&found, Metric::Taxels).values[k].value.unwrap().value;
+        let areas = [0, 1].map(|k| {
+            let rmse = row(&found, Metric::Rmse).values[k].value.unwrap().value;
+            taxels(k) * rmse * rmse
+        });
+        assert!(is_near(areas[0], areas[1]), "{areas:?}");
+    }
+    let share = row(&found, Metric::WithinRate).values[0]
+        .value
+        .unwrap()
+        .value;
+    assert!(
+        share > 0.1 && share < 0.9,
+        "{share}: the limit tells nothing"
+    );
+}
+
+#[test]
+fn every_metric_has_a_name_and_a_unit() {
+    let a = record(1, PlantedCause::Nothing).skin('A', None);
+    let found = compared(&a, &record(2, PlantedCause::Nothing).skin('B', None));
+    let rows = found.table.iter().map(|r| {
+        let (scale, unit) = (r.format.scale, r.format.unit);
+        format!("{} | {} | {scale} {unit}", r.name, r.unit)
+    });
+    let rows: Vec<String> = rows.collect();
+    let expected = [
+        "RMSE | mm | 1 mm",
+        "RMSE along x | mm | 1 mm",
+        "RMSE along y | mm | 1 mm",
+        "bias along x | mm | 1 mm",
+        "bias along y | mm | 1 mm",
+        "std of repetitions | mm | 1 mm",
+        "located rate | share | 100 %",
+        "within 0.1 mm | share | 100 %",
+        "latency, median | ms | 1 ms",
+        "latency, 5-95 % width | ms | 1 ms",
+        "false alarms | 1/s | 1 /s",
+        "events, idle | events/s | 0.001 kev/s",
+        "events, press | events/s | 0.001 kev/s",
+        "data, press | bytes/s | 0.001 kB/s",
+        "taxels | locations | 1 ",
+    ];
+    assert_eq!(rows, expected);
+}
+
+#[test]
+fn the_map_has_the_error_of_each_location() {
+    let a = record(1, PlantedCause::Nothing).skin('A', None);
+    let b = record(2, PlantedCause::Nothing).skin('B', None);
+    let found = compared(&a, &b);
+    assert_eq!(found.locations.len(), 25);
+    for (k, subject) in [&a, &b].into_iter().enumerate() {
+        let mut means = Vec::new();
+        for location in &found.locations {
+            let at_location = |p: &&PressResult| {
+                let d = (
+                    p.planned.x_mm - location.at.x_mm,
+                    p.planned.y_mm - location.at.y_mm,
+                );
+                d.0.hypot(d.1) < 0.05
+            };
+            let presses: Vec<_> = scored(subject).filter(at_location).collect();
+            assert_eq!(presses.len(), 2, "{location:?}");
+            assert!(presses.iter().all(|p| p.verdict == Verdict::Valid));
+            let errors = presses.iter().map(|p| p.error_mm().unwrap());
+            let lengths = mean(errors.clone().map(|(x, y)| libm::hypot(x, y)));
+            let own = &location.skins[k];
+            assert!(is_near(own.error_mm.unwrap(), lengths), "{own:?}");
+            let vector = own.vector_mm.unwrap();
+            assert!(is_near(vector[0], mean(errors.clone().map(|e| e.0))));
+            assert!(is_near(vector[1], mean(errors.map(|e| e.1))));
+            assert_eq!(own.presses, [2, 2]);
+            means.push((lengths, own.rank.unwrap()));
+        }
+        means.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let ranks: Vec<u32> = means.iter().map(|m| m.1).collect();
+        assert_eq!(ranks, (1..=25).collect::<Vec<u32>>());
+    }
+}
+
+/// Each skin with its own calibration has the RMSE of the table; with that of the other, as many presses are located.
+#[test]
+fn calibrations_exchanged_between_skins_locate_the_same_presses() {
+    let a = record(1, PlantedCause::Nothing).skin('A', None);
+    let b = record(2, PlantedCause::Camera(1.0, 1.5)).skin('B', None);
+    let found = compared(&a, &b);
+    let rows = &found.causes[0].as_ref().unwrap().exchanged;
+    let of = |presses: char, calibration: char| {
+        let row = rows
+            .iter()
+            .find(|r| (r.presses, r.calibration) == (presses, calibration));
+        row.unwrap()
+    };
+    for (k, letter) in ['A', 'B'].into_iter().enumerate() {
+        let own = of(letter, letter);
+        let rmse = row(&found, Metric::Rmse).values[k].value.unwrap().value;
+        assert!(is_near(own.rmse_mm.unwrap(), rmse), "{own:?}");
+        assert_eq!(own.located, [50, 50]);
+        let other = of(letter, if k == 0 { 'B' } else { 'A' });
+        assert_eq!(other.located[1], 50);
+        assert!(other.rmse_mm.unwrap() > rmse, "{other:?}");
+    }
+}
