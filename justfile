@@ -21,6 +21,11 @@ lint:
     cargo clippy -p skinrig --all-targets --features evk4,tls,postgres --locked -- -D warnings
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 
+# Mutation tests of one mutant in `share` of a crate (install: `cargo install cargo-mutants`): `just mutants compare 15`,
+# `just mutants analysis 400 --test-package skinrig-analysis --test-package skinrig-analysis-tests`.
+mutants crate share *args:
+    cargo mutants -p skinrig-{{ crate }} --shard 0/{{ share }} --sharding round-robin --cap-lints=true -o target {{ args }} -- --locked
+
 # Complete check of a clean clone.
 ci:
     bash .ci/run
