@@ -9,10 +9,9 @@ use skinrig_model::{PressRole, RepetitionId, Verdict as PressVerdict};
 use crate::locations::Locations;
 use crate::metrics::Metric;
 use crate::no_result::NoResult;
-use crate::subject::{Session, Subject};
+use crate::subject::{Session, Subject, sample};
 use skinrig_statistics::{
-    AlphaSpending, ComparisonTarget, Interval, Outlook, Sample, SampleFault, Settings, Verdict,
-    compare,
+    AlphaSpending, ComparisonTarget, Interval, Outlook, Sample, Settings, Verdict, compare,
 };
 
 /// One look at the data: the first repetitions of both skins, as many of each.
@@ -90,13 +89,10 @@ pub(crate) fn look(
         let chosen = first_repetitions(subjects, number);
         let locations = Locations::of(&chosen);
         let samples = chosen.each_ref().map(|s| {
-            let sample = |s: &Subject| {
+            sample(s, &s.by_session(), |s| {
                 let presses = locations.attempts(s);
                 Sample::rms(presses.filter_map(|p| Some((p.location, p.error_mm()?))))
-            };
-            let sessions = s.by_session();
-            let sessions = sessions.iter().map(sample).collect::<Result<Vec<_>, _>>()?;
-            Ok::<_, SampleFault>(sample(s)?.of_sessions(sessions))
+            })
         });
         let found = match samples {
             [Ok(a), Ok(b)] => compare(&a, &b, &question, &own).map_err(NoResult::from),

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::PressView;
 use skinrig_model::SkinOutline;
+use skinrig_statistics::{Sample, SampleFault};
 
 /// Everything known about a session besides its results.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -118,6 +119,16 @@ impl Subject {
     pub(crate) fn outline(&self) -> Option<&SkinOutline> {
         self.sessions.first().map(|s| &s.analysis.rig.outline)
     }
+}
+
+/// A sample of a skin that tells its sessions apart. `by_session`: as [`Subject::by_session`].
+pub(crate) fn sample(
+    subject: &Subject,
+    by_session: &[Subject],
+    of: impl Fn(&Subject) -> Result<Sample, SampleFault>,
+) -> Result<Sample, SampleFault> {
+    let sessions = by_session.iter().map(&of).collect::<Result<Vec<_>, _>>()?;
+    Ok(of(subject)?.of_sessions(sessions))
 }
 
 /// Values in one line.

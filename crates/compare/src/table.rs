@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::locations::Locations;
 use crate::metrics::{DisplayFormat, Metric};
 use crate::no_result::NoResult;
-use crate::subject::Subject;
+use crate::subject::{Subject, sample};
 use skinrig_statistics::{
     AdjustedComparison, Comparison, ComparisonTarget, Interval, PairSelection, Sample, SampleFault,
     Settings, Verdict, compare_all, estimate,
@@ -75,9 +75,9 @@ pub(crate) fn table(
             .iter()
             .zip(&by_session)
             .map(|(subject, sessions)| {
-                let sample = |s: &Subject| metric.sample(s, locations, within_mm, area_mm2);
-                let sessions = sessions.iter().map(sample).collect::<Result<Vec<_>, _>>()?;
-                Ok(sample(subject)?.of_sessions(sessions))
+                sample(subject, sessions, |s| {
+                    metric.sample(s, locations, within_mm, area_mm2)
+                })
             })
             .collect();
         let values = samples.iter().map(|sample| {

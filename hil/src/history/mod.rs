@@ -104,10 +104,7 @@ pub fn append_newest(
         Err(HistoryError::Missing { .. }) => Vec::new(),
         known => known?,
     };
-    let own = known.into_iter().find(|line| {
-        (&line.rig, &line.rig_kind, &line.suite) == (&night.rig, &night.rig_kind, &night.suite)
-    });
-    match own {
+    match known.into_iter().find(|line| line.has(night)) {
         Some(line) if line.newest > night.started => Err(HistoryError::DatedEarlier {
             path: path.to_owned(),
             started: night.started.clone(),

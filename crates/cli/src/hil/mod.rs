@@ -11,6 +11,7 @@ pub(crate) mod lease;
 mod live;
 mod messages;
 mod real_bench;
+mod rebuild;
 pub(crate) mod run;
 pub(crate) mod trend;
 mod trouble;

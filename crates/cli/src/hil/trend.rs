@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glob::{Pattern, PatternError};
-use skinrig_hil::history::{self, AppendOutcome, Filter, HistoryError};
-use skinrig_hil::night_folder;
+use skinrig_hil::history::{self, Filter, HistoryError};
 use skinrig_nightly::trend::{Acceptance, Alarm, History, Report, judge};
 use skinrig_nightly::{Night, NightExit};
 use skinrig_report::trend::{Links, Style, page, terminal};
@@ -20,7 +19,7 @@ use crate::exit::{Exit, Failure, Outcome};
 /// written.
 pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     if let Some(folder) = &args.rebuild {
-        rebuild(&args.history, folder)?;
+        super::rebuild::rebuild(&args.history, folder)?;
     }
     let (history, report) = judge_history(args)?;
     let pattern = args.series.as_deref().unwrap_or("*");
@@ -100,69 +99,6 @@ fn name_others(args: &HilTrendArgs) -> Result<(), Failure> {
             "note: judged {judged}; not judged: {}\n  next: --rig NAME, --suite NAME",
             others.join(", ")
         );
-    }
-    Ok(())
-}
-
-/// Adds the nights in the folders of `nights` to the history.
-fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
-    let cannot = |e| Failure::input(format!("--rebuild: {}: {e}", nights.display()));
-    let entries = std::fs::read_dir(nights).map_err(cannot)?;
-    let entries = entries.map(|e| e.map(|e| e.path().join(night_folder::JSON)));
-    let mut night_files: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
-    night_files.retain(|json| json.is_file());
-    night_files.sort();
-    let before = match history::suites(path) {
-        Err(HistoryError::Missing { .. }) => Vec::new(),
-        found => found.map_err(Failure::input)?,
-    };
-    let is_earlier = |night: &Night| {
-        before.iter().any(|s| {
-            (&s.rig, &s.rig_kind, &s.suite) == (&night.rig, &night.rig_kind, &night.suite)
-                && night.started < s.newest
-        })
-    };
-    let (mut new, mut earlier, mut known, mut skipped) = (0, 0, 0, 0);
-    for json in &night_files {
-        let night = history::read_night(json);
-        let home = json.parent().unwrap_or(nights);
-        let added =
-            night.and_then(|night| Ok((history::append(path, &night, home)?, is_earlier(&night))));
-        match added {
-            Ok((AppendOutcome::Added, is_earlier)) => {
-                new += 1;
-                earlier += usize::from(is_earlier);
-            }
-            Ok((AppendOutcome::AlreadyPresent, _)) => known += 1,
-            Err(
-                e @ (HistoryError::InvalidNight { .. } | HistoryError::ConflictingNight { .. }),
-            ) => {
-                skipped += 1;
-                errln!("warning: skipped {}: {e}", home.display());
-            }
-            Err(e) => return Err(Failure::input(e)),
-        }
-    }
-    if night_files.is_empty() {
-        return Err(Failure::input(format!(
-            "--rebuild: {}: expected folders with a {}, found none",
-            nights.display(),
-            night_folder::JSON
-        )));
-    }
-    errln!("{new} nights added, {known} already present, {skipped} skipped");
-    if earlier > 0 {
-        errln!(
-            "warning: {earlier} of them started before nights that the history had already: they join the reference and are not judged as new\n  \
-             next: if the clock of the computer was wrong, delete {0} and rebuild it without their folders",
-            path.display()
-        );
-    }
-    if new + known == 0 {
-        return Err(Failure::input(format!(
-            "--rebuild: {}: expected finished nights, found none; see the warnings above",
-            nights.display()
-        )));
     }
     Ok(())
 }

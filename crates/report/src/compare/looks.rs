@@ -41,7 +41,7 @@ pub(super) fn conclusion(of: &SequentialComparison, letter: char) -> String {
             text::counted(repetitions as usize, "more repetition")
         ),
         Outlook::NotByRepetitions => {
-            "repetitions at these locations will not decide; press more locations".to_owned()
+            "repetitions at these locations will not decide; press more locations or record more sessions".to_owned()
         }
         Outlook::Spent => "all planned looks are used, which is the end".to_owned(),
         Outlook::Decided | Outlook::Unknown => {

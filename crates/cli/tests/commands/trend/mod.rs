@@ -438,6 +438,11 @@ fn nights_that_are_dated_before_others_are_not_taken_for_the_newest() {
         "1 nights added, 0 already present, 0 skipped",
         "1 of them started before nights that the history had already",
     ]);
+    nights.add_file("2099-01-02");
+    nights.trend(&["--rebuild", &all]).expect_stderr(&[
+        "1 nights added, 1 already present",
+        "1 of them start in the future",
+    ]);
 }
 
 #[test]

@@ -52,6 +52,15 @@ fn night(at: usize, golden: Option<&str>, measured: &[(&str, &str, &str, &str, f
     }
 }
 
+/// A night of this day, YYYY-MM-DD.
+fn dated(day: &str) -> Night {
+    Night {
+        id: format!("{day}T02-00-00Z-small"),
+        started: format!("{day}T02:00:00Z"),
+        ..night(0, None, &[("disk", "computer", "write_rate", "B/s", 1e15)])
+    }
+}
+
 fn check(&(name, subject, metric, unit, value): &(&str, &str, &str, &str, f64)) -> CheckResult {
     let measurement = Measurement {
         metric: metric.to_owned(),
@@ -147,12 +156,16 @@ impl Nights {
 
     /// A night of this day, YYYY-MM-DD.
     pub(super) fn add_dated(&self, day: &str) {
-        let dated = Night {
-            id: format!("{day}T02-00-00Z-small"),
-            started: format!("{day}T02:00:00Z"),
-            ..night(0, None, &[("disk", "computer", "write_rate", "B/s", 1e15)])
-        };
-        self.append(&dated);
+        self.append(&dated(day));
+    }
+
+    /// As [`add_dated`](Self::add_dated), in a folder that the history does not have.
+    pub(super) fn add_file(&self, day: &str) {
+        let dated = dated(day);
+        let home = self.lab.path("nights").join(&dated.id);
+        std::fs::create_dir(&home).unwrap();
+        let json = serde_json::to_vec(&dated).unwrap();
+        std::fs::write(home.join("night.json"), json).unwrap();
     }
 
     /// Adds a night with its page to the history; returns its folder.
