@@ -91,8 +91,7 @@ impl Session {
 
 /// True if both share more than half of what the smaller one has.
 fn mostly_shared<T: Ord>(one: &BTreeSet<T>, other: &BTreeSet<T>) -> bool {
-    let fewer = one.len().min(other.len());
-    fewer > 0 && 2 * one.intersection(other).count() > fewer
+    2 * one.intersection(other).count() > one.len().min(other.len())
 }
 
 impl Subject {

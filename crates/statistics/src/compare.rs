@@ -51,7 +51,11 @@ pub fn compare(
         return Err(ComparisonError::Kinds { a, b });
     }
     let data = [a.data(), b.data()];
-    let (of, left_out, sessions) = measured([a, b], settings.pairing)?;
+    let Measured {
+        of,
+        left_out,
+        sessions,
+    } = measured([a, b], settings.pairing)?;
     let both = [&of[0], &of[1]];
     let difference = Inference::difference(both, 1.0, sessions, settings);
     let whole = difference.interval(settings.alpha);
@@ -130,11 +134,16 @@ fn p_of_distance(difference: &Inference, sum: &Inference) -> f64 {
     2.0 * further.min(nearer)
 }
 
-/// Measures both samples, counts the locations that each leaves out, and how their sessions differ.
-fn measured(
-    samples: [&Sample; 2],
-    pairing: Pairing,
-) -> Result<([Measure; 2], [u32; 2], Option<SessionSpread>), ComparisonError> {
+/// Two samples over the locations that are compared.
+struct Measured {
+    of: [Measure; 2],
+    /// Locations that each leaves out.
+    left_out: [u32; 2],
+    /// How their sessions differ, if they can be told apart.
+    sessions: Option<SessionSpread>,
+}
+
+fn measured(samples: [&Sample; 2], pairing: Pairing) -> Result<Measured, ComparisonError> {
     let data = samples.map(Sample::data);
     let estimator = RepeatEstimator::for_samples(data);
     let sets = data.map(Data::locations);
@@ -168,11 +177,15 @@ fn measured(
     let by_session = [0, 1].map(|i| {
         let keep = keep(1 - i);
         let values = samples[i].sessions().iter().filter_map(|session| {
-            let of = measure(session, estimator, Side::A, &keep).ok()?;
+            let of = measure(session, estimator, Side::A, keep).ok()?;
             Some(of.value).filter(|value| value.is_finite())
         });
         values.collect::<Vec<f64>>()
     });
     let sessions = SessionSpread::of(by_session.each_ref().map(Vec::as_slice));
-    Ok((of, left_out, sessions))
+    Ok(Measured {
+        of,
+        left_out,
+        sessions,
+    })
 }

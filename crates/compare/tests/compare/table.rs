@@ -4,6 +4,7 @@
 use skinrig_analysis::result::{PressResult, PressView};
 use skinrig_compare::{Comparison, ComparisonOptions, Metric, Row, Subject, compare};
 use skinrig_model::{PressRole, Verdict};
+use skinrig_statistics::{AlphaSpending, Pairing};
 
 use crate::causes::planted::{PlantedCause, record};
 
@@ -205,4 +206,74 @@ fn calibrations_exchanged_between_skins_locate_the_same_presses() {
         assert_eq!(other.located[1], 50);
         assert!(other.rmse_mm.unwrap() > rmse, "{other:?}");
     }
+}
+
+/// Presses that do not count: the map has no error where none counts.
+#[test]
+fn a_location_without_a_press_that_counts_has_no_error() {
+    let mut a = record(1, PlantedCause::Nothing).skin('A', None);
+    let b = record(2, PlantedCause::Nothing).skin('B', None);
+    let lost = scored(&a).next().unwrap().location;
+    let presses = a.sessions[0].analysis.presses.iter_mut();
+    for press in presses.filter(|p| p.role == PressRole::Score && p.location == lost) {
+        let mut json = serde_json::to_value(&*press).unwrap();
+        json["verdict"] = "excluded".into();
+        json["cause"] = serde_json::json!({"no_cluster": {"camera": "camera1"}});
+        *press = serde_json::from_value(json).unwrap();
+    }
+    let found = compared(&a, &b);
+    let without: Vec<_> = found
+        .locations
+        .iter()
+        .filter(|l| l.skins[0].error_mm.is_none())
+        .collect();
+    let [location] = without[..] else {
+        panic!("{without:#?}");
+    };
+    let [own, other] = &location.skins[..] else {
+        panic!("{location:#?}");
+    };
+    assert_eq!((own.vector_mm, own.rank), (None, None), "{own:#?}");
+    assert!(other.error_mm.is_some() && other.difference_mm.is_none());
+    assert_eq!(other.sign(), 0);
+}
+
+#[test]
+fn looks_spend_alpha_and_an_overridden_rig_keeps_the_locations_paired() {
+    let (a, mut b) = (
+        record(1, PlantedCause::Nothing).skin('A', None),
+        record(2, PlantedCause::Nothing).skin('B', None),
+    );
+    let options = ComparisonOptions {
+        sequential: Some(AlphaSpending {
+            planned_looks: None,
+        }),
+        ..ComparisonOptions::default()
+    };
+    let found = compare(&[a.clone(), b.clone()], &vec![None], &options);
+    let looks = found.sequential.unwrap().looks;
+    let spent: Vec<f64> = looks.iter().map(|l| l.spent).collect();
+    let sums = [0.025, 0.025 + 0.05 / 6.0];
+    assert_eq!(spent.len(), 2, "{looks:#?}");
+    assert!(
+        spent.iter().zip(sums).all(|(s, sum)| is_near(*s, sum)),
+        "{spent:?}"
+    );
+
+    let fact = |kind: &str| [("rig.kind".to_owned(), kind.to_owned())].into();
+    let mut a = a;
+    a.sessions[0].facts.values = fact("simulated");
+    b.sessions[0].facts.values = fact("bench");
+    let of = |overrides: &[&str]| {
+        let options = ComparisonOptions {
+            overrides: overrides.iter().map(|o| (*o).to_owned()).collect(),
+            ..ComparisonOptions::default()
+        };
+        compare(&[a.clone(), b.clone()], &vec![None], &options)
+    };
+    let refused = of(&[]);
+    assert!(refused.table.is_empty() && refused.blocking().next().is_some());
+    let despite = of(&["rig-kind"]);
+    assert!(!despite.table.is_empty());
+    assert_eq!(despite.settings.pairing, Pairing::SharedLocations);
 }
