@@ -71,6 +71,14 @@ impl SkinPresses {
         }
     }
 
+    #[cfg(test)]
+    pub(super) fn new(by_place: BTreeMap<u32, Vec<PressFactors>>, calibration_cost: f64) -> Self {
+        Self {
+            by_place,
+            calibration_cost,
+        }
+    }
+
     pub(super) fn locations(&self) -> impl Iterator<Item = u32> {
         self.by_place.keys().copied()
     }

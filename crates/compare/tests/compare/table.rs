@@ -238,6 +238,23 @@ fn a_location_without_a_press_that_counts_has_no_error() {
     assert_eq!(other.sign(), 0);
 }
 
+/// The skins share one of their depths; a location pressed at another alone is not compared.
+#[test]
+fn a_location_without_a_shared_depth_is_not_on_the_map() {
+    let [a, b] = [(1, 1.0), (2, 1.5)].map(|(seed, depth_mm)| {
+        let mut skin = record(seed, PlantedCause::Nothing).skin('A', None);
+        let first = scored(&skin).next().unwrap().location;
+        let presses = skin.sessions[0].analysis.presses.iter_mut();
+        let own = presses.filter(|p| p.role == PressRole::Score && p.location == first);
+        own.for_each(|p| p.depth_mm = depth_mm);
+        skin
+    });
+    let found = compared(&a, &b);
+    assert_eq!(found.locations.len(), 24);
+    let attempted: Vec<u32> = found.skins.iter().map(|s| s.attempted).collect();
+    assert_eq!(attempted, [48, 48]);
+}
+
 #[test]
 fn looks_spend_alpha_and_an_overridden_rig_keeps_the_locations_paired() {
     let (a, mut b) = (

@@ -103,12 +103,6 @@ fn verdict(result: &Comparison) -> Section {
         );
         notes.push(Note::of(text.code("--limits").add(".")).warning());
     }
-    if result.skins.iter().all(|s| s.sessions.len() == 1) {
-        notes.push(Note::of(
-            "One session per skin: changes between sessions (mounting, light, calibration) cannot be separated from the \
-             skin. Intervals are over locations on the skin.",
-        ));
-    }
     if result.skins.len() > 2 {
         notes.push(Note::of(
             "Verdicts are corrected for the number of skins (Holm).",

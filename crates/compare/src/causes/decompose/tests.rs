@@ -56,3 +56,68 @@ fn draws_are_seeded_and_within_range() {
     all.iter().flatten().for_each(|i| counts[*i] += 1);
     assert!(counts.iter().all(|n| *n > 60), "{counts:?}");
 }
+
+/// A press along x with these errors and this offset from plan, mm.
+fn press(fitted: f64, used: f64, off_plan: f64) -> PressFactors {
+    PressFactors {
+        used: [used, 0.0],
+        fitted: [fitted, 0.0],
+        off_plan: [off_plan, 0.0],
+        per_event: 1e-3,
+        width2: 100.0,
+        cluster: 0.2,
+        idle_per_s: 2_000.0,
+    }
+}
+
+/// Two locations with these presses: fitted error and offset from plan. The used error is the fitted one times `used`.
+fn skin(presses: [[(f64, f64); 2]; 2], used: f64, calibration_cost: f64) -> SkinPresses {
+    let at = |presses: [(f64, f64); 2]| presses.map(|(e, off)| press(e, used * e, off)).to_vec();
+    let [first, second] = presses.map(at);
+    SkinPresses::new([(3, first), (8, second)].into(), calibration_cost)
+}
+
+fn assert_near(found: [f64; 5], expected: [f64; 5]) {
+    let near = found
+        .iter()
+        .zip(expected)
+        .all(|(f, e)| (f - e).abs() < 1e-12);
+    assert!(near, "{found:?}, not {expected:?}");
+}
+
+fn parts(of: &ErrorBudget) -> [f64; 5] {
+    [of.mse, of.calibration, of.robot, of.scatter, of.bias]
+}
+
+#[test]
+fn a_budget_has_the_parts_that_it_was_made_of() {
+    // Means 1.1 and -0.9; within a location +-0.1, so a variance of 0.02. The fitted errors have a mean square of 1.02, the used ones
+    // twice that, of which half of the scatter is the fit's.
+    let scattered = [[(1.0, 0.0), (1.2, 0.0)], [(-1.0, 0.0), (-0.8, 0.0)]];
+    let found = error_budget(&skin(scattered, 2f64.sqrt(), 0.5), &[0, 1]);
+    assert_near(parts(&found), [2.04, 1.01, 0.0, 0.03, 1.0]);
+    assert!((found.excess - 2f64.ln()).abs() < 1e-12);
+    // A robot that is off by +-0.3 mm, which the errors follow in the opposite direction.
+    let robot = [[(0.7, 0.3), (1.3, -0.3)], [(-1.3, 0.3), (-0.7, -0.3)]];
+    let found = error_budget(&skin(robot, 1.0, 0.0), &[0, 1]);
+    assert_near(parts(&found), [1.09, 0.0, 0.09, 0.0, 1.0]);
+    // Errors that follow it in the same direction do so by chance.
+    let chance = robot.map(|at| at.map(|(e, off)| (e, -off)));
+    let found = error_budget(&skin(chance, 1.0, 0.0), &[0, 1]);
+    assert_near(parts(&found), [1.09, 0.0, 0.0, 0.18, 0.91]);
+}
+
+#[test]
+fn contributions_average_the_settings_and_give_them_the_rest() {
+    let a = skin([[(1.0, 0.0); 2], [(-1.0, 0.0); 2]], 1.0, 0.0);
+    let worse = skin([[(1.0, 0.0); 2], [(-1.0, 0.0); 2]], 3f64.sqrt(), 0.0);
+    // Settings of A: both skins are alike. Settings of B: the calibration of the second adds 2 mm².
+    let alone = contributions(&[[a.clone(), worse.clone()]], &[0, 1]);
+    assert_eq!((alone.mse[0], alone.by_factor[0]), (1.0, 0.0));
+    assert!((alone.mse[1] - 3.0).abs() < 1e-12 && (alone.change - 2.0).abs() < 1e-12);
+    assert!((alone.by_factor[1] - 2.0).abs() < 1e-12, "{alone:?}");
+    let both = contributions(&[[a.clone(), a.clone()], [a, worse]], &[0, 1]);
+    assert!((both.change - 2.0).abs() < 1e-12, "{both:?}");
+    assert!((both.by_factor[1] - 1.0).abs() < 1e-12, "{both:?}");
+    assert!((both.by_factor[0] - 1.0).abs() < 1e-12, "{both:?}");
+}
