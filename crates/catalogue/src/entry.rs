@@ -86,12 +86,12 @@ pub(crate) fn seconds(rfc3339: &str) -> Option<i64> {
 /// Reads the session at `path` with its `analyses`, names and results files.
 ///
 /// # Errors
-/// If the session cannot be read, or is not as it was sealed. Results and tags that cannot be read are part of the entry.
+/// If the session cannot be read, or its header is not the sealed one. Results and tags that cannot be read are part of the entry.
 pub(crate) fn read(
     path: &Path,
     analyses: &[(String, PathBuf)],
 ) -> Result<SessionEntry, RecorderError> {
-    let reader = SessionReader::open_unchanged(path)?;
+    let reader = SessionReader::open(path)?;
     let headline = reader.headline()?;
     let legs = reader.legs()?;
     let seal = reader.seal()?;
