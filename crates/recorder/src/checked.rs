@@ -66,9 +66,14 @@ impl SessionReader {
     }
 
     fn compare_journal_with_seal(&self) -> Result<(), RecorderError> {
+        let seal = self.seal_row()?;
         let tables = self.query("checking the seal", async |conn| {
             let mut names = Vec::new();
-            for recorded in sealed_tables(conn).await? {
+            let recorded = sealed_tables(conn).await?;
+            if seal.is_some_and(|seal| tree_hash(&recorded) != seal.tree_sha256) {
+                names.push("seal".to_owned());
+            }
+            for recorded in recorded {
                 let is_journal = !BULK.contains(&recorded.name.as_str());
                 if is_journal
                     && digest_table(conn, &recorded.name, |_| {}).await?.as_ref() != Some(&recorded)

@@ -224,7 +224,7 @@ pub(crate) fn digest_from(row: &SqliteRow) -> Result<TableDigest, Fault> {
     })
 }
 
-/// Digests of the tables as they were sealed.
+/// Digests of the tables as they were sealed, in the order of the tree hash.
 pub(crate) async fn sealed_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
     let mut recorded = Vec::new();
     let query = sqlx::query("SELECT name, rows, sha256 FROM table_digest");
@@ -233,6 +233,7 @@ pub(crate) async fn sealed_tables(conn: &mut SqliteConnection) -> Result<Vec<Tab
         Ok(())
     })
     .await?;
+    recorded.sort_by_key(|table| TABLES.iter().position(|known| known.name == table.name));
     Ok(recorded)
 }
 

@@ -278,6 +278,7 @@ fn a_sealed_session_that_was_edited_is_described_by_no_command() {
             "attempt",
             "UPDATE attempt SET measured_x_mm = measured_x_mm + 5 WHERE press = 3",
         ),
+        ("seal", "DELETE FROM table_digest WHERE name = 'attempt'"),
     ];
     let selection = lab.text("chosen.yaml");
     for (table, statement) in edits {
