@@ -39,7 +39,8 @@ fn findings(seed: u64, faults: Vec<Fault>) -> Vec<Finding> {
     analysis.findings
 }
 
-fn analysed(protocol: &str, level: SimLevel, seed: u64, faults: Vec<Fault>) -> Analysis {
+/// Analysis of a session of `protocol` on a rig drawn from `seed`.
+pub(crate) fn analysed(protocol: &str, level: SimLevel, seed: u64, faults: Vec<Fault>) -> Analysis {
     let mut config = SimConfig::new(seed, level);
     config.faults = faults;
     analysed_on(protocol, &config)

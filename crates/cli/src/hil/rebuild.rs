@@ -74,7 +74,7 @@ impl Rebuild {
             );
         }
         if *future > 0 {
-            errln!("warning: {future} of them start in the future\n  {next}");
+            errln!("warning: of these, {future} dated in the future\n  {next}");
         }
     }
 }

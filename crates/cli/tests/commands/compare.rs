@@ -351,7 +351,7 @@ fn the_number_of_shared_locations_is_told() {
     let places = "path.points=[[10 mm, 2 mm], [-10 mm, 18 mm], [2 mm, -16 mm], [23 mm, 15 mm]]";
     let b = record(&lab, "b", "2", &["--set", places]);
     let told = skinrig(&["compare", &a, &b]).code(0);
-    let shared = "compared  2 shared locations alone: ";
+    let shared = "compared  only 2 shared locations: ";
     assert!(told.out.contains(shared), "{told:#?}");
     let same = skinrig(&["compare", &a, &a, "--despite", "same-session"]);
     assert!(!same.out.contains("compared  "), "{same:#?}");

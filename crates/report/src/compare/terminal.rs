@@ -73,7 +73,7 @@ fn shared(result: &Comparison) -> Vec<Note> {
         let [a, b] = design.presses;
         (design.left_out != [0, 0]).then(|| {
             let text = format!(
-                "{} alone: {a} presses of A, {b} of {letter}",
+                "only {}: {a} presses of A, {b} of {letter}",
                 text::counted(locations as usize, "shared location")
             );
             Note::new("compared", text).warning()

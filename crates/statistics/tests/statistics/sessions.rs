@@ -22,7 +22,7 @@ fn settings() -> Settings {
 /// (location, error) of each press of a session.
 type Session = Vec<(u32, f64)>;
 
-/// Sessions of two skins with this true difference of the mean. Whole numbers of sessions as in `sessions`.
+/// So many sessions of each skin, with this true difference of the mean and this standard deviation between sessions.
 fn skins(seed: u64, sessions: [usize; 2], difference: f64, spread: f64) -> [Vec<Session>; 2] {
     let mut rng = seeded::generator(seed, 7);
     let mut normal = move || (0..12).map(|_| seeded::signed_unit(&mut rng)).sum::<f64>() / 2.0;
@@ -104,7 +104,7 @@ fn more_sessions_decide_what_more_presses_cannot() {
     assert_eq!(then.verdict, Verdict::Worse, "{then:#?}");
 }
 
-/// Sessions that do not differ widen nothing much: the interval is that over locations, within a tenth for many sessions.
+/// With sessions that do not differ the interval is wider than that over locations, but less than twice as wide.
 #[test]
 fn sessions_that_are_alike_cost_little() {
     let widths: Vec<f64> = (0..20)
@@ -122,7 +122,7 @@ fn sessions_that_are_alike_cost_little() {
     assert!(widths.iter().all(|w| (1.0..2.0).contains(w)), "{widths:?}");
 }
 
-/// Equal skins a margin apart are not called equivalent because of two lucky sessions.
+/// Skins a margin apart are not called equivalent because of two lucky sessions.
 #[test]
 fn sessions_limit_what_is_called_equivalent() {
     let margin = 0.2;

@@ -441,7 +441,7 @@ fn nights_that_are_dated_before_others_are_not_taken_for_the_newest() {
     nights.add_file("2099-01-02");
     nights.trend(&["--rebuild", &all]).expect_stderr(&[
         "1 nights added, 1 already present",
-        "1 of them start in the future",
+        "of these, 1 dated in the future",
     ]);
 }
 
