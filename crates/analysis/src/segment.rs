@@ -18,7 +18,8 @@ pub struct Window {
     pub row: usize,
     /// `window_before_ms` before the contact (or before the middle of the press).
     pub start_us: u64,
-    /// `window_after_ms` after the release (or after the middle); at most `window_after_contact_ms` after the contact.
+    /// `window_after_ms` after the release (or after the middle); at most `window_after_contact_ms` after the contact
+    /// and, with anchor `touch`, `window_after_depth_ms` after the tip reached its depth.
     pub end_us: u64,
     /// Start of the idle time before it: at most 0.5 s, back to the end of any earlier window or attempt. Equal to
     /// `start_us` if less than 20 ms is free, or if the end of a directly preceding attempt is unknown.
@@ -84,9 +85,16 @@ pub fn windows(
             };
             let start_us = tick(first - settings.window_before_ms * 1e3);
             let end_us = tick(last + settings.window_after_ms * 1e3).max(start_us);
-            let cut_us = settings
+            let after_contact_us = settings
                 .window_after_contact_ms
                 .map_or(u64::MAX, |ms| tick(contact + ms * 1e3));
+            let after_depth_us = match settings.window_anchor {
+                WindowAnchor::Touch => tick(
+                    clock.camera_us_of_host(timing.at_depth) + settings.window_after_depth_ms * 1e3,
+                ),
+                WindowAnchor::Middle => u64::MAX,
+            };
+            let cut_us = after_contact_us.min(after_depth_us);
             let window = Window {
                 row,
                 start_us,
@@ -173,6 +181,20 @@ mod tests {
         assert_eq!((w[1].start_us, w[1].idle_start_us), (1_650_250, 1_550_250));
         // 10 ms are free before the third: too little for a rate.
         assert_eq!((w[2].start_us, w[2].idle_start_us), (2_260_250, 2_260_250));
+    }
+
+    #[test]
+    fn a_long_hold_ends_its_window_a_second_after_the_depth_was_reached() {
+        let settings = AnalysisSettings::default();
+        // 20 s of hold; the next press begins 300 ms after its release.
+        let presses = [(0, timing(1.0, 21.2)), (1, timing(21.5, 22.0))];
+        let w = windows(presses.into_iter(), &[], &clock(0.0), &settings);
+        assert_eq!((w[0].start_us, w[0].end_us), (950_000, 2_100_000));
+        // The rest of the hold is not idle time.
+        assert_eq!(
+            (w[1].idle_start_us, w[1].start_us),
+            (21_250_000, 21_450_000)
+        );
     }
 
     #[test]

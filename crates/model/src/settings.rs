@@ -415,6 +415,10 @@ pub struct AnalysisSettings {
     /// The press window ends at most this long after the measured contact; absent: only the release ends it.
     #[setting(min = NANOSECOND_MS, max = 60_000.0)]
     pub window_after_contact_ms: Option<f64>,
+    /// The press window ends at most this long after the tip reached its depth: the rest of a long hold adds noise alone. Without effect
+    /// on windows about the middle of the press.
+    #[setting(default = "1 s", min = NANOSECOND_MS, max = 60_000.0)]
+    pub window_after_depth_ms: f64,
     /// Anchor of the press window.
     #[setting(default = "touch")]
     pub window_anchor: WindowAnchor,

@@ -6,7 +6,7 @@
 /// press, thresholds 17 to 19, and 3 to 8 at 1/1024 of the events. Each has its source in `docs/reference/paper.md`.
 ///
 /// The calibration stays the protocol's: the block that judges as published fits the paper's eight parameters itself.
-pub const REFERENCE_CODE: [&str; 34] = [
+pub const REFERENCE_CODE: [&str; 35] = [
     "analysis.crop.camera1=[185 px, 360 px]",
     "analysis.crop.camera2=[200 px, 355 px]",
     "analysis.window_anchor=middle",
@@ -21,6 +21,7 @@ pub const REFERENCE_CODE: [&str; 34] = [
     "analysis.thinning=1",
     "analysis.bin=1 px",
     "analysis.window_after_contact=60 s",
+    "analysis.window_after_depth=60 s",
     "analysis.cluster_threshold=fixed",
     "analysis.min_cluster_events=0",
     "analysis.min_response_sigma=0",

@@ -42,6 +42,8 @@ pub(crate) struct Streams {
     pub silences: [Silences; 2],
     /// Contacts detected in the counts, s on the host clock; empty for a session of several legs.
     pub contacts_s: [Vec<f64>; 2],
+    /// First event, s on the host clock; with the contacts.
+    pub begun_s: [Option<f64>; 2],
     /// Onsets of the presses.
     pub onsets: [Vec<Onset>; 2],
 }
@@ -68,6 +70,7 @@ pub(crate) fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams
         pattern::findings(
             &presses_seen,
             streams.contacts_s.each_ref().map(Vec::as_slice),
+            streams.begun_s,
         ),
         burst::findings(analysis, &presses_seen),
         mark_step::findings(input),

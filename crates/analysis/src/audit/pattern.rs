@@ -17,10 +17,11 @@ const TOGETHER_S: f64 = 0.15;
 const SYNC_LENGTHS: f64 = 2.0;
 const SYNC_S: f64 = 3.0;
 
-/// `contacts_s`: contacts detected in the counts of each camera, s on the host clock.
+/// `contacts_s`: contacts detected in the counts of each camera, and `begun_s`: its first event, s on the host clock.
 pub(super) fn findings(
     presses_seen: &[ObservedPress<'_>],
     contacts_s: [&[f64]; 2],
+    begun_s: [Option<f64>; 2],
 ) -> Vec<Finding> {
     let scheduled: Vec<&ObservedPress<'_>> = presses_seen
         .iter()
@@ -59,8 +60,14 @@ pub(super) fn findings(
         .filter(|at| !near(**at, &by_both, NEAR_S))
         .filter(|at| [one, two].iter().all(|all| !near(**at, all, NEAR_S)));
     let (more, fewer) = (unlisted.iter().filter(of_sync).count(), unseen.count());
+    // Cameras that had begun would have seen the first sync press.
+    let begin_is_recorded = begun_s
+        .iter()
+        .all(|at| at.is_some_and(|at| at < begin - NEAR_S));
+    let any_is_seen = sync.iter().any(|at| near(*at, &by_both, NEAR_S));
+    let is_recorded = (begin_is_recorded && any_is_seen) || contacts_before(contacts_s, begin);
     let mut found = Vec::new();
-    if more > 0 || (fewer > 0 && begin_is_recorded(contacts_s, begin)) {
+    if more > 0 || (fewer > 0 && is_recorded) {
         let evidence = Evidence::SyncTimes {
             planned_s: sync.iter().map(|at| at - first).collect(),
             found_s: offsets_s.collect(),
@@ -94,8 +101,8 @@ pub(super) fn findings(
     found
 }
 
-/// True if anything was seen before or at the start of the sync part, which shows that the cameras were running.
-fn begin_is_recorded(contacts_s: [&[f64]; 2], begin: f64) -> bool {
+/// True if both cameras saw a contact before or at the start of the sync part.
+fn contacts_before(contacts_s: [&[f64]; 2], begin: f64) -> bool {
     contacts_s
         .iter()
         .all(|all| all.first().is_some_and(|at| *at <= begin + NEAR_S))

@@ -82,8 +82,9 @@ use crate::rule::Rule;
 /// positions have at least nine correct digits where the problem is well posed. Version 14: so have held-out errors; the
 /// estimated depth treats ON and OFF alike, and intervals are wider for few locations. Version 16: a depth that presses stopped short of has no
 /// errors of its own. Version 19: a place that a plan lists again is one location. Version
-/// 20: a look needs half of the presses, and an open question is a warning.
-pub const ANALYSIS_VERSION: u32 = 23;
+/// 20: a look needs half of the presses, and an open question is a warning. Version 24: the window of a long hold ends 1 s after the depth was
+/// reached.
+pub const ANALYSIS_VERSION: u32 = 24;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
