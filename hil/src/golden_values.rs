@@ -18,8 +18,8 @@ const REFERENCES: u64 = 2;
 const SAME_LOCATION_MM: f64 = 1e-6;
 /// Half width of a 95 % interval in standard errors.
 const Z: f64 = 1.96;
-/// Metrics that need aligned clocks.
-const CLOCK_METRICS: [&str; 8] = [
+/// Metrics of events that belong to presses.
+const PRESS_METRICS: [&str; 8] = [
     "rmse",
     "repeat_std",
     "latency",
@@ -34,9 +34,9 @@ const CLOCK_METRICS: [&str; 8] = [
 /// `lost_bytes` is by camera.
 pub(crate) fn add(analysis: &Analysis, lost_bytes: [u64; 2], findings: &mut Findings) {
     golden_evidence::add(analysis, lost_bytes, findings);
-    if !analysis.is_valid() {
-        // Without clocks no event can be assigned to a press.
-        for metric in CLOCK_METRICS {
+    // Without clocks no event can be assigned to a press, and what the audit finds makes the presses others than stated: deeper, displaced.
+    if !(analysis.is_valid() && analysis.findings.is_empty()) {
+        for metric in PRESS_METRICS {
             findings.unmeasured(SKIN, metric);
         }
         valid(analysis, findings);
@@ -240,5 +240,42 @@ impl Sample {
         let half = Z * self.variance_of_mean().sqrt();
         half.is_finite()
             .then_some([self.mean - half, self.mean + half])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_analysis::analyze;
+    use skinrig_analysis::result::{Evidence, Fault, Finding, Law};
+
+    use super::*;
+
+    /// The error of presses that were deeper than stated is no error of the skin, however small.
+    #[test]
+    fn a_session_with_a_finding_measures_nothing_of_the_skin() {
+        let (input, events) = skinrig_planted::grid::session();
+        let mut analysis = analyze(&input, &events).expect("an analysis");
+        let rmse = |analysis: &Analysis| {
+            let mut findings = Findings::default();
+            add(analysis, [0; 2], &mut findings);
+            let rmse = findings.values.iter().find(|v| v.metric == "rmse");
+            (rmse.expect("the metric").value, findings.evidence.len())
+        };
+        assert!(matches!(rmse(&analysis), (Some(_), 0)));
+        analysis.findings.push(Finding {
+            law: Law::AsCommanded,
+            fault: Fault::HeightOff,
+            camera: None,
+            evidence: Evidence::Unlisted {
+                listed: 1,
+                more: 1,
+                from_s: 0.0,
+                to_s: 1.0,
+            },
+            advice: String::new(),
+            invalidates: false,
+        });
+        assert!(analysis.is_valid());
+        assert_eq!(rmse(&analysis), (None, 1));
     }
 }

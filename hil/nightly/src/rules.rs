@@ -77,18 +77,18 @@ pub const RULES: &[Rule] = &[
         reason: "a device of the rig was faulty; measurements with it do not describe the skin",
     },
     Rule {
-        name: "not-plausible",
-        kinds: &[EvidenceKind::Audit],
-        cause: None,
-        verdict: Verdict::Fail,
-        reason: "the session of the golden skin could not be analysed, or its numbers contradict each other",
-    },
-    Rule {
         name: "ended-early",
         kinds: &[EvidenceKind::Stopped, EvidenceKind::TimeOut],
         cause: Some(Cause::Infrastructure),
         verdict: Verdict::Inconclusive,
         reason: "not measured: the suite was stopped or timed out",
+    },
+    Rule {
+        name: "not-plausible",
+        kinds: &[EvidenceKind::Audit],
+        cause: None,
+        verdict: Verdict::Fail,
+        reason: "the session of the golden skin could not be analysed, or its numbers contradict each other",
     },
     Rule {
         name: "too-little",
@@ -134,7 +134,16 @@ pub struct Case<'a> {
     pub evidence: &'a [&'a Evidence],
 }
 
-/// Applies the rules. A good verdict stands: evidence can explain a failure but cannot cause one.
+/// Evidence that a check did not measure all it was asked to. What it did measure proves nothing, even within all limits.
+pub const CUT_SHORT: [EvidenceKind; 4] = [
+    EvidenceKind::Software,
+    EvidenceKind::Lease,
+    EvidenceKind::Stopped,
+    EvidenceKind::TimeOut,
+];
+
+/// Applies the rules. A good verdict stands unless the check was [`CUT_SHORT`]: other evidence can explain a failure but cannot
+/// cause one.
 #[must_use]
 pub fn apply_rules(case: &Case<'_>) -> RuleResult {
     let Case {
@@ -143,7 +152,11 @@ pub fn apply_rules(case: &Case<'_>) -> RuleResult {
         default_cause,
         evidence,
     } = *case;
-    if verdict.is_good() {
+    let is_good = verdict.is_good();
+    let kinds = evidence.iter().map(|e| e.kind);
+    let counts = |kind: &EvidenceKind| !is_good || CUT_SHORT.contains(kind);
+    let kinds: Vec<EvidenceKind> = kinds.filter(counts).collect();
+    if is_good && kinds.is_empty() {
         return RuleResult {
             verdict,
             cause: None,
@@ -151,8 +164,8 @@ pub fn apply_rules(case: &Case<'_>) -> RuleResult {
         };
     }
     let matches = |rule: &&Rule| {
-        let explains = rule.verdict != Verdict::Inconclusive || !exceeds_limit;
-        explains && evidence.iter().any(|e| rule.kinds.contains(&e.kind))
+        let explains = is_good || rule.verdict != Verdict::Inconclusive || !exceeds_limit;
+        explains && kinds.iter().any(|kind| rule.kinds.contains(kind))
     };
     RULES.iter().find(matches).map_or(
         RuleResult {

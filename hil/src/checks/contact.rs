@@ -35,7 +35,7 @@ pub(super) fn depth(check: &Check, bench: &mut dyn Bench, findings: &mut Finding
         bench,
         Reach::Skin,
         findings,
-        &["surface", "error"],
+        &["height", "spread", "error"],
         &mut |arm, findings| press_to_depth(arm, findings, depth_mm, presses),
     );
 }
@@ -47,7 +47,7 @@ fn press_to_depth(
     presses: u32,
 ) -> Result<(), Problem> {
     check_depth_limit(arm, depth_mm)?;
-    let (mut surface_mm, mut squares, mut n) = (0.0_f64, 0.0, 0);
+    let (mut heights_mm, mut squares) = (Vec::new(), 0.0);
     for at in arm.volume.press_points.clone() {
         for _ in 0..presses {
             arm.go_above(at)?;
@@ -62,12 +62,19 @@ fn press_to_depth(
             arm.go(at.at_height(arm.search.band_mm), INDENTATION_MM_S)?;
             let reached_mm = touched_mm - mean(last(&samples, AVERAGING)).z_mm;
             squares += (reached_mm - depth_mm).powi(2);
-            surface_mm = surface_mm.max(touched_mm.abs());
-            n += 1;
+            heights_mm.push(touched_mm);
         }
     }
+    let n = heights_mm.len();
+    // Signed: a touch registers below the surface, and a wrong frame must not hide behind that.
+    let height_mm = heights_mm.iter().sum::<f64>() / n as f64;
+    let spread_mm = heights_mm.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+        - heights_mm.iter().copied().fold(f64::INFINITY, f64::min);
     findings
-        .value(ROBOT, "surface", surface_mm)
+        .value(ROBOT, "height", height_mm)
+        .with_samples(n, 3);
+    findings
+        .value(ROBOT, "spread", spread_mm)
         .with_samples(n, 3);
     let error_mm = (squares / n as f64).sqrt();
     findings.value(ROBOT, "error", error_mm).with_samples(n, 3);

@@ -7,8 +7,8 @@ use skinrig_settings::{Collector, Field, Setting, Settings, Shape};
 
 use super::check::{Check, Light, Measure, Metric};
 use super::limits::{
-    Count, DataRate, Drift, EventRate, Force, Length, Loss, Offset, Ratio, Share, Space, Time,
-    WriteRate,
+    Count, DataRate, Drift, EventRate, Force, Height, Length, Loss, Offset, Ratio, Share, Space,
+    Time, WriteRate,
 };
 
 /// Each check: documentation, file form, key, title, what it measures with which parameters, and its metrics with their limits.
@@ -38,6 +38,7 @@ macro_rules! checks {
                     $metric: Option<Limit>,
                 )+
                 /// Reason to skip the check for now. It is reported as SKIPPED, and its limits stay in the file.
+                #[setting(shape = Shape::Text, read = super::check::skip_reason)]
                 skip: Option<String>,
             }
 
@@ -258,8 +259,10 @@ checks! {
         #[setting(default = "3", min = 1, max = 100)]
         presses: u32,
     } {
-        /// Largest height of a touch above or below the frame's surface.
-        surface: Length,
+        /// Mean height of the touches above the frame's surface; negative: below.
+        height: Height,
+        /// Largest difference between two touches.
+        spread: Length,
         /// Root mean square of measured minus commanded depth.
         error: Length,
     }

@@ -5,6 +5,27 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 use skinrig_model::{HostDuration, Limit};
+use skinrig_settings::{Collector, Field};
+
+/// Words that answer yes or no, also of YAML 1.1, or stand for nothing.
+const NO_REASONS: [&str; 9] = ["false", "no", "off", "n", "true", "yes", "on", "y", "null"];
+
+/// Why a check is skipped. `skip: false` would skip it, too: such words are errors.
+pub(super) fn skip_reason(field: &Field, out: &mut Collector) -> Option<String> {
+    let text = field.as_text()?;
+    let is_reason = text.chars().any(char::is_alphabetic)
+        && !NO_REASONS
+            .iter()
+            .any(|word| text.eq_ignore_ascii_case(word));
+    if !is_reason {
+        out.error(field.span, field.path.as_str(), "this is no reason")
+            .expected("why the check is skipped")
+            .found(format!("`{text}`"))
+            .help("write for example `skip: lamp is being repaired`, or remove the line to run the check");
+        return None;
+    }
+    Some(text.to_owned())
+}
 
 /// One check of a suite.
 #[derive(Debug, Clone, PartialEq, Serialize)]

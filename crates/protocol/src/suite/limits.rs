@@ -73,6 +73,14 @@ limit!(
     "{at_most: 0.5 mm}"
 );
 limit!(
+    Height,
+    "limit_height",
+    "mm",
+    Good::Around,
+    "0.5 mm",
+    "{at_least: -0.5 mm, at_most: 0.1 mm}"
+);
+limit!(
     Time,
     "limit_time",
     "s",

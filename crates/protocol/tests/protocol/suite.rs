@@ -67,6 +67,22 @@ checks:
 }
 
 #[test]
+fn a_skipped_check_has_a_reason() {
+    let suite = |skip: &str| {
+        format!(
+            "skinrig_suite: 1\nname: s\nbudget: 1 min\nchecks: {{identity: {{differences: {{at_most: 0}}, skip: {skip}}}}}\n"
+        )
+    };
+    for skip in ["false", "no", "Off", "'no'", "true", "0", "null", "~"] {
+        let message = findings(&suite(skip));
+        assert!(message.contains("suite.yaml:4:"), "{skip}: {message}");
+        assert!(message.contains("skip"), "{skip}: {message}");
+    }
+    let suite = Suite::parse("suite.yaml", suite("no lamp today").as_bytes()).unwrap();
+    assert_eq!(suite.checks[0].skip.as_deref(), Some("no lamp today"));
+}
+
+#[test]
 fn limits_that_find_no_fault_or_that_nothing_meets_are_refused() {
     let all = [
         (

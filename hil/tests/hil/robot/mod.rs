@@ -63,8 +63,9 @@ fn a_healthy_robot_gives_small_numbers_and_is_braked_after_each_check() {
     let depth = bench.run_check(DEPTH);
     assert_eq!(depth.evidence, []);
     // A touch is detected at 0.2 N, 0.33 mm deep in a skin of 0.6 N/mm.
-    let surface = value(&depth, "surface").unwrap();
-    assert!((0.25..0.5).contains(&surface), "{depth:?}");
+    let height = value(&depth, "height").unwrap();
+    assert!((-0.5..-0.25).contains(&height), "{depth:?}");
+    assert!(value(&depth, "spread").unwrap() < 0.05, "{depth:?}");
     assert!(value(&depth, "error").unwrap() < 0.05, "{depth:?}");
     let force = bench.run_check(FORCE);
     let peak = value(&force, "peak").unwrap();

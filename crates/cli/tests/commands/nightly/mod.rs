@@ -34,7 +34,7 @@ checks:
   robot_state: {faults: {at_most: 0}, creep: {at_most: 0.1 mm}}
   repeatability: {approaches: 2, spread: {at_most: 0.2 mm}, error: {at_most: 0.3 mm}}
   step_response: {steps: 3, settling: {at_most: 500 ms}, error: {at_most: 0.2 mm}}
-  depth: {presses: 1, surface: {at_most: 0.6 mm}, error: {at_most: 0.2 mm}}
+  depth: {presses: 1, height: {at_least: -0.6 mm, at_most: 0.1 mm}, error: {at_most: 0.2 mm}}
   force_ceiling: {force: 1 N, depth: 2.5 mm, peak: {at_most: 1.5 N}}
   watchdog_drill: {braked_within: {at_most: 10 s}, drop: {at_most: 50 mm}}
   stop_drill: {stopped_within: {at_most: 1 s}, distance: {at_most: 10 mm}}
@@ -227,8 +227,8 @@ fn pass_all_checks() {
     }
     assert_eq!(observed.exit, 0, "{}", observed.stderr);
     // A touch registers at 0.2 N: 0.4 mm deep in this skin of 500 N/m.
-    let surface_mm = observed.value("depth", "robot", "surface").unwrap();
-    assert!((0.2..0.6).contains(&surface_mm), "{surface_mm}");
+    let height_mm = observed.value("depth", "robot", "height").unwrap();
+    assert!((-0.6..-0.2).contains(&height_mm), "{height_mm}");
     let peak_n = observed.value("force_ceiling", "robot", "peak").unwrap();
     assert!((0.9..1.5).contains(&peak_n), "{peak_n}");
     assert!(

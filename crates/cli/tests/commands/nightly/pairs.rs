@@ -182,12 +182,12 @@ pub(super) const FAULTS: &[FaultCase] = &[
     },
     FaultCase {
         name: "frame too low",
-        // The surface is found 0.7 mm above its position in the file.
-        plant: |n| n.edit_rig("-2 mm, -20 mm]", "-2 mm, -21.1 mm]"),
+        // The surface is found 0.2 mm above its position in the file, where a touch registers 0.3 mm below it.
+        plant: |n| n.edit_rig("-2 mm, -20 mm]", "-2 mm, -20.5 mm]"),
         check: "depth",
         shows: Limit {
             subject: "robot",
-            metric: "surface",
+            metric: "height",
         },
         also: &[],
         hides: &[],

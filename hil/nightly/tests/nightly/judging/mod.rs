@@ -8,8 +8,8 @@ use proptest::prelude::*;
 use skinrig_model::Limit;
 use skinrig_nightly::judge::{RepeatRule, judge_attempt, part_verdicts};
 use skinrig_nightly::rules::{
-    CROSS_CHECK_RULES, Case, GOLDEN_ON_A_BAD_RIG, RULES, WITNESSES, apply_cross_check_rules,
-    apply_rules,
+    CROSS_CHECK_RULES, CUT_SHORT, Case, GOLDEN_ON_A_BAD_RIG, RULES, WITNESSES,
+    apply_cross_check_rules, apply_rules,
 };
 use skinrig_nightly::trend::History;
 use skinrig_nightly::{Cause, Evidence, EvidenceKind, NightExit, Verdict};
@@ -122,6 +122,40 @@ fn each_evidence_kind_gives_its_verdict_and_cause() {
             expected,
             "{kind:?}"
         );
+    }
+}
+
+/// A check that was cut short found nothing bad, because it hardly looked: that is no PASS, and no night of a trend.
+#[test]
+fn what_was_cut_short_is_not_good() {
+    let limit = Limit::at_most(1.0);
+    let parts = || {
+        let lost = measured("lost", Some(0.0), limit);
+        vec![
+            part("camera1", vec![lost.clone()]),
+            part("camera2", vec![lost]),
+        ]
+    };
+    let judge = |kind| {
+        judge_attempt(
+            (0.0, 1.0),
+            parts(),
+            vec![evidence(kind, "computer")],
+            Cause::Rig,
+        )
+    };
+    for (kind, verdict) in [
+        (EvidenceKind::Stopped, Verdict::Inconclusive),
+        (EvidenceKind::TimeOut, Verdict::Inconclusive),
+        (EvidenceKind::Lease, Verdict::Fail),
+        (EvidenceKind::Software, Verdict::Fail),
+        (EvidenceKind::HostLate, Verdict::Pass),
+    ] {
+        let attempt = judge(kind);
+        assert_eq!(attempt.verdict, verdict, "{kind:?}");
+        let mut made = check("idle", verdict, attempt.cause);
+        made.attempts = vec![attempt.clone()];
+        assert_eq!(part_verdicts(&made, &attempt), [verdict; 2], "{kind:?}");
     }
 }
 
@@ -261,6 +295,10 @@ fn documentation_lists_the_rules() {
     }
 }
 
+fn is_cut_short(evidence: &Evidence) -> bool {
+    CUT_SHORT.contains(&evidence.kind)
+}
+
 fn any_verdict() -> impl Strategy<Value = Verdict> {
     prop::sample::select(Verdict::ALL.to_vec())
 }
@@ -272,8 +310,8 @@ fn any_evidence() -> impl Strategy<Value = Evidence> {
 }
 
 proptest! {
-    /// Evidence never makes a bad verdict good or a good one bad, and a value beyond its limit stays
-    /// a failure.
+    /// Evidence never makes a bad verdict good, makes a good one bad exactly if the check was cut short, and a value beyond its
+    /// limit stays a failure.
     #[test]
     fn evidence_never_turns_a_verdict(
         verdict in any_verdict(),
@@ -283,8 +321,9 @@ proptest! {
     ) {
         let near: Vec<&Evidence> = evidence.iter().collect();
         let ruling = apply_rules(&Case { verdict, exceeds_limit, default_cause, evidence: &near });
-        prop_assert_eq!(ruling.verdict.is_good(), verdict.is_good());
-        prop_assert_eq!(ruling.cause.is_some(), !verdict.is_good());
+        let is_whole = !evidence.iter().any(is_cut_short);
+        prop_assert_eq!(ruling.verdict.is_good(), verdict.is_good() && is_whole);
+        prop_assert_eq!(ruling.cause.is_some(), !ruling.verdict.is_good());
         if verdict == Verdict::Fail && exceeds_limit {
             prop_assert!(ruling.verdict >= Verdict::Fail);
         }
@@ -303,11 +342,15 @@ proptest! {
             .zip(&values)
             .map(|(name, v)| part(name, vec![measured("jitter", *v, Limit::at_most(1.0))]))
             .collect();
-        let good = parts.iter().all(|p| p.verdict.is_good());
-        let judged = judge_attempt((0.0, 0.0), parts.clone(), evidence.clone(), Cause::Rig);
-        prop_assert_eq!(judged.verdict.is_good(), good);
-        let with = judge_attempt((0.0, 0.0), parts, [evidence, vec![more]].concat(), Cause::Rig);
-        prop_assert_eq!(with.verdict.is_good(), good);
+        let within = parts.iter().all(|p| p.verdict.is_good());
+        let good = |evidence: Vec<Evidence>| {
+            let judged = judge_attempt((0.0, 0.0), parts.clone(), evidence, Cause::Rig);
+            judged.verdict.is_good()
+        };
+        let whole = !evidence.iter().any(is_cut_short);
+        prop_assert!(good(evidence.clone()) <= within);
+        prop_assert!(good(evidence.clone()) || !within || !whole);
+        prop_assert!(good([evidence.clone(), vec![more]].concat()) <= good(evidence));
     }
 
     /// A check that failed once never becomes PASS, and becomes MARGINAL only after enough
