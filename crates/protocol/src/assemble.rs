@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use skinrig_model::level_bias::is_measured_for;
+use skinrig_model::level_bias::{is_measured_for, is_measured_over, is_measured_with};
 use skinrig_model::pulse::MAX_MARKED_PRESS;
 use skinrig_model::{PulseTrain, SimLevel, SkinOutline, StereoGeometry};
 use skinrig_settings::{Collector, Diagnostics, Field, Finding, Settings, Span, open};
@@ -177,6 +177,8 @@ fn assemble(
     let (depths_mm, roles, outline) = (depths_mm?, roles?, outline?);
     let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
     let is_measured = outline == SkinOutline::PAPER
+        && keys.analysis.as_ref().is_none_or(is_measured_with)
+        && is_measured_over(&locations)
         && motion
             .indent
             .zip(motion.hold)

@@ -203,7 +203,7 @@ impl SceneKeys {
         out.error(
             at.span,
             "scene.level",
-            "the level's differences are not measured for these presses",
+            "the level's differences are not measured for these presses or this analysis",
         )
         .expected(format!("`optical`, or presses as measured: {CONDITIONS}"))
         .found(format!("`{level}` for other presses"))

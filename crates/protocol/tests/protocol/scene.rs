@@ -21,30 +21,30 @@ fn the_cheapest_level_within_needs_and_tolerances_is_taken() {
     for (scene, expected) in [
         ("needs: [motion]", Kinematic),
         (
-            "needs: [motion]\n  tolerances: {event_rate: 30 %}",
+            "needs: [motion]\n  tolerances: {event_rate: 75 %}",
             Geometric,
         ),
-        ("tolerances: {event_rate: 30 %}", Geometric),
+        ("tolerances: {event_rate: 75 %}", Geometric),
         (
-            "tolerances: {event_rate: 30 %, localisation_rmse: 0.5 mm}",
+            "tolerances: {event_rate: 75 %, localisation_rmse: 1.6 mm}",
             Geometric,
         ),
-        ("tolerances: {event_rate: 10 %}", Optical),
+        ("tolerances: {event_rate: 70 %}", Optical),
         (
-            "tolerances: {event_rate: 30 %, localisation_rmse: 0.2 mm}",
+            "tolerances: {event_rate: 75 %, localisation_rmse: 1.5 mm}",
             Optical,
         ),
         ("tolerances: {latency: 1 ms}", Optical),
         ("tolerances: {idle_rate: 10 %}", Optical),
         (
-            "needs: [latency]\n  tolerances: {event_rate: 30 %}",
+            "needs: [latency]\n  tolerances: {event_rate: 75 %}",
             Optical,
         ),
         ("parts: [readout]", Optical),
         (CAMERAS, Geometric),
         // Levels are compared for the published cameras only.
         (
-            &format!("tolerances: {{event_rate: 30 %}}\n  {CAMERAS}"),
+            &format!("tolerances: {{event_rate: 75 %}}\n  {CAMERAS}"),
             Optical,
         ),
     ] {
@@ -67,12 +67,19 @@ fn where_levels_are_not_compared_tolerances_take_the_optical_one() {
         ("depth: 2 mm", "depths: [2 mm, 2.5 mm]"),
         ("hold: 150 ms", "hold: 200 ms"),
         ("indent: 20 mm/s", "indent: 25 mm/s"),
+        ("columns: 9", "columns: 2"),
+        ("depth: 2 mm", "depth: 2 mm\nanalysis: {min_samples: 400}"),
+        (
+            "depth: 2 mm",
+            "depth: 2 mm\nanalysis: {window_after_contact: 30 ms}",
+        ),
+        ("depth: 2 mm", "depth: 2 mm\nanalysis: {locator: geometry}"),
         (
             "outline: paper",
             "outline: {centre: [10 mm, 2 mm], width: 90 mm, height: 90 mm, chamfer: 0 mm, radius: 10 mm}",
         ),
     ] {
-        let tolerant = "tolerances: {event_rate: 30 %}";
+        let tolerant = "tolerances: {event_rate: 75 %}";
         match with(tolerant, change) {
             Ok(protocol) => assert_eq!(protocol.scene.level, SimLevel::Optical, "{change:?}"),
             Err(e) => panic!("{change:?}: {e}"),
