@@ -20,7 +20,8 @@ class Session:
     """A session file, opened for reading, sealed or still growing.
 
     Tables have the columns of `skinrig export`. `presses`, `results` and `events` need the session's analysis: the results beside
-    the session if they are of this version, else it is analysed once, in memory.
+    the session if they are of this version, else it is analysed once, in memory. The tables of an INVALID session raise
+    `InvalidSessionWarning`.
     """
 
     def __new__(cls, path: _Path) -> Session: ...
@@ -109,3 +110,6 @@ class StoppedError(SkinrigError):
 
 class MachineError(SkinrigError):
     """A fault of skinrig or of this machine, for example a full disk (exit code 1)."""
+
+class InvalidSessionWarning(UserWarning):
+    """The session is INVALID: use none of its numbers."""

@@ -188,8 +188,9 @@ fn files(
     Ok((written, invalid))
 }
 
-/// The failure of an export with the numbers of an INVALID session.
-fn invalid(session: &Path, analysis: &Analysis) -> Option<Failure> {
+/// The failure of an export with the numbers of an INVALID session; `None` for a valid one.
+#[must_use]
+pub fn invalid(session: &Path, analysis: &Analysis) -> Option<Failure> {
     (!analysis.is_valid()).then(|| {
         Failure::limit(format!(
             "{0}: INVALID, do not use the exported numbers (`valid` is false in the results): {1}\n  next: `skinrig analyze {0}` says \

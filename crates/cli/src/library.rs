@@ -18,6 +18,7 @@ use crate::signals::Operator;
 use crate::terminal::Output;
 use crate::{analyses, check, compare, conclusion, run, selection};
 
+pub use crate::export::invalid;
 pub use crate::view::Program;
 
 /// Returns the official analysis of a session for its tables, without the bulk data for figures, and its later legs as aligned.
@@ -123,6 +124,13 @@ pub struct CompareOptions {
 /// # Errors
 /// As `skinrig compare`.
 pub fn compare(options: CompareOptions) -> Result<Value, Failure> {
+    if let Some(within) = options.within_mm
+        && !(within.is_finite() && within > 0.0)
+    {
+        return Err(Failure::input(format!(
+            "within: expected an error threshold above 0 mm, found {within}"
+        )));
+    }
     let margin = |text: &String| {
         Margin::parse(text).map_err(|e| Failure::input(format!("margin `{text}`: {e}")))
     };

@@ -7,6 +7,7 @@ use std::time::SystemTime;
 use skinrig_recorder::{SESSION_SUFFIX, SessionReader, SessionState, SessionSummary, writer_of};
 use skinrig_text::{Column, Table, cut};
 
+use crate::analyses;
 use crate::args::SessionsArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::file_name;
@@ -133,15 +134,27 @@ pub(crate) fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf
 }
 
 /// The representative of several copies of one session: one whose rows are those that were sealed before a changed one, sealed
-/// before unsealed (`salvage` never seals), then the shorter path before the longer.
+/// before unsealed (`salvage` never seals), analysed before not analysed, then the shorter path before the longer.
 fn representative<'a>(copies: &[&'a SessionSummary]) -> Option<&'a SessionSummary> {
     if let [only] = copies {
         return Some(only);
     }
     let rank = |s: &&&SessionSummary| {
         let sealed = matches!(s.state, SessionState::Readable { sealed: true, .. });
+        let analysed = match &s.state {
+            SessionState::Readable { session_id, .. } => {
+                analyses::summary(&s.path, session_id, None).is_ok()
+            }
+            SessionState::Empty | SessionState::Broken { .. } => false,
+        };
         let changed = SessionReader::open_checked(&s.path).is_err();
-        (changed, !sealed, s.path.as_os_str().len(), s.path.clone())
+        (
+            changed,
+            !sealed,
+            !analysed,
+            s.path.as_os_str().len(),
+            s.path.clone(),
+        )
     };
     copies.iter().min_by_key(rank).copied()
 }

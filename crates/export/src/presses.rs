@@ -14,6 +14,8 @@ struct Row<'a> {
     attempts: Vec<AttemptRow>,
     found: Option<&'a PressResult>,
     indentation: Option<&'a PressIndentation>,
+    /// Not made yet, in a session without an end.
+    is_open: bool,
 }
 
 impl Row<'_> {
@@ -67,7 +69,9 @@ pub(crate) fn table(source: &Source<'_>) -> Result<Table, ExportError> {
     let found = source.analysis.map(|(analysis, _)| &analysis.presses);
     let rows = source.reader.presses()?.into_iter().enumerate();
     let indented = source.analysis.and_then(|(a, _)| a.indentation.as_ref());
+    let is_under_way = source.reader.end()?.is_none();
     let rows = rows.map(|(i, (planned, attempts))| Row {
+        is_open: is_under_way && attempts.last().is_none_or(|a| a.outcome.is_none()),
         indentation: indented.and_then(|all| all.of(planned.id)),
         planned,
         attempts,
@@ -103,11 +107,14 @@ fn journal(table: &mut Columns<'_>) {
     table.int("attempts", |r| r.attempts.len() as i64);
     // An analysis excludes presses by its own rules.
     table.text("verdict", |r| {
+        if r.is_open {
+            return Some("open".to_owned());
+        }
         let recorded = r.last().map_or("open", |o| o.verdict.name());
         let found = r.found.map_or(recorded, |f| f.verdict.name());
         Some(found.to_owned())
     });
-    table.text("reason", |r| match r.found {
+    table.text("reason", |r| match r.found.filter(|_| !r.is_open) {
         Some(found) => found.reason(),
         None => r.last()?.verdict.reason(),
     });

@@ -81,6 +81,7 @@ pub struct StreamInspection {
     /// Steps of the time base that are neither progress nor a wrap. At most `LIST_LIMIT` of them; all are
     /// counted in `stats`.
     pub discontinuities: Vec<Discontinuity>,
+    steps_back: bool,
     previous_us: Option<u64>,
     threshold_us: u64,
 }
@@ -113,9 +114,12 @@ impl StreamInspection {
         self.last_us = decoder.last_us();
     }
 
-    /// Length of the recording in seconds; `None` without two times in order.
+    /// Length of the recording in seconds; `None` without two times in order, or where the time steps back.
     #[must_use]
     pub fn span_s(&self) -> Option<f64> {
+        if self.steps_back {
+            return None;
+        }
         let span_us = self.last_us?.checked_sub(self.first_us?)?;
         Some(span_us as f64 * 1e-6)
     }
@@ -153,6 +157,7 @@ impl EventSink for StreamInspection {
         self.see(edge.t_us);
     }
     fn on_discontinuity(&mut self, step: Discontinuity) {
+        self.steps_back |= step.to_us < step.from_us;
         if self.discontinuities.len() < LIST_LIMIT {
             self.discontinuities.push(step);
         }

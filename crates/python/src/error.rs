@@ -1,7 +1,7 @@
 //! Owns the exceptions: the classes, and which failure becomes which.
 
 use pyo3::create_exception;
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
 use skinrig::exit::{Exit, Failure};
 use skinrig_export::ExportError;
@@ -50,6 +50,13 @@ create_exception!(
     "A fault of skinrig or of this machine, for example a full disk (exit code 1)."
 );
 
+create_exception!(
+    skinrig,
+    InvalidSessionWarning,
+    PyUserWarning,
+    "The session is INVALID: use none of its numbers."
+);
+
 /// The exception for a failure.
 pub(crate) fn raised(failure: Failure) -> PyErr {
     let text = without_styles(&failure.message);
@@ -77,7 +84,7 @@ pub(crate) fn no_table(error: ExportError) -> PyErr {
 }
 
 /// `text` without the styles of a terminal: `ESC [ ... m`.
-fn without_styles(text: &str) -> String {
+pub(crate) fn without_styles(text: &str) -> String {
     let mut parts = text.split("\u{1b}[");
     let mut plain = parts.next().unwrap_or_default().to_owned();
     for part in parts {

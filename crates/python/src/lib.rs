@@ -19,8 +19,8 @@ use pyo3::prelude::*;
 mod module {
     #[pymodule_export]
     use crate::error::{
-        DamagedSessionError, InputError, LimitError, MachineError, RigError, SkinrigError,
-        StoppedError,
+        DamagedSessionError, InputError, InvalidSessionWarning, LimitError, MachineError, RigError,
+        SkinrigError, StoppedError,
     };
     #[pymodule_export]
     use crate::functions::{analyze, compare, simulate};

@@ -1,5 +1,6 @@
 //! Owns `Session`: one session file as tables, arrays and texts.
 
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -12,7 +13,9 @@ use skinrig_model::{CameraId, RunHeader};
 use skinrig_recorder::SessionReader;
 use skinrig_results::{ChunkIndex, Origin, events_between};
 
-use crate::error::{InputError, no_table, raised, unreadable};
+use crate::error::{
+    InputError, InvalidSessionWarning, no_table, raised, unreadable, without_styles,
+};
 use crate::events::PackedEvents;
 use crate::options::to_python;
 use crate::table::Columns;
@@ -20,7 +23,8 @@ use crate::table::Columns;
 /// A session file, opened for reading, sealed or still growing.
 ///
 /// Tables have the columns of `skinrig export`, which docs/reference/exports.md defines. `presses`, `results` and `events` need
-/// the session's analysis: the results beside the session if they are of this version, else it is analysed once, in memory.
+/// the session's analysis: the results beside the session if they are of this version, else it is analysed once, in memory. The
+/// tables of an INVALID session raise `InvalidSessionWarning`.
 #[pyclass(frozen, module = "skinrig")]
 pub(crate) struct Session {
     path: PathBuf,
@@ -35,6 +39,8 @@ pub(crate) struct Session {
 struct AnalysisTables {
     presses: Columns,
     results: Columns,
+    /// Why none of their numbers may be used.
+    invalid: Option<CString>,
 }
 
 impl Session {
@@ -61,9 +67,21 @@ impl Session {
         let found = Arc::new(AnalysisTables {
             presses: Columns::of(&source, TableName::Presses).map_err(no_table)?,
             results: Columns::of(&source, TableName::Results).map_err(no_table)?,
+            invalid: library::invalid(&self.path, &analysis)
+                .and_then(|failure| CString::new(without_styles(&failure.message)).ok()),
         });
         *analysed = Some(Arc::clone(&found));
         Ok(found)
+    }
+
+    /// The tables, after a warning if the session is INVALID.
+    fn warned(&self, py: Python<'_>) -> PyResult<Arc<AnalysisTables>> {
+        let analysed = py.detach(|| self.analysed())?;
+        if let Some(why) = &analysed.invalid {
+            let category = py.get_type::<InvalidSessionWarning>();
+            PyErr::warn(py, &category, why, 1)?;
+        }
+        Ok(analysed)
     }
 
     /// Calls `then` with a table, read without the interpreter's lock.
@@ -74,8 +92,8 @@ impl Session {
         then: impl Fn(&Columns) -> PyResult<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         match name {
-            "presses" => then(&py.detach(|| self.analysed())?.presses),
-            "results" => then(&py.detach(|| self.analysed())?.results),
+            "presses" => then(&self.warned(py)?.presses),
+            "results" => then(&self.warned(py)?.results),
             "poses" => {
                 let poses = py.detach(|| Columns::of(&self.source(), TableName::Pose));
                 then(&poses.map_err(no_table)?)

@@ -159,3 +159,9 @@ def test_long_calls_release_the_interpreter(session_path):
         turns += 1
     thread.join()
     assert turns > 5
+
+
+@pytest.mark.parametrize("within_mm", [0, -1, float("nan"), float("inf")])
+def test_an_impossible_error_threshold_is_refused(analysed_path, within_mm):
+    with pytest.raises(skinrig.InputError, match="within: expected an error threshold above 0 mm"):
+        skinrig.compare(analysed_path, analysed_path, within_mm=within_mm)

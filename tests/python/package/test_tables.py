@@ -99,3 +99,10 @@ def test_a_resumed_session(tmp_path):
         window = row.camera2_contact_us - 20e3, row.camera2_release_us + 20e3
         expected = everything[(everything["t_us"] >= window[0]) & (everything["t_us"] <= window[1])]
         assert len(found) > 100 and np.array_equal(found, expected)
+
+
+@pytest.mark.parametrize("read", [lambda s: s.presses, lambda s: s.results, lambda s: s.columns("presses")])
+def test_numbers_of_an_invalid_session_raise_a_warning(tmp_path, read):
+    path = skinrig.simulate(SMALL, tmp_path, {"analysis.alignment.max_residual": "1 ns"})
+    with pytest.warns(skinrig.InvalidSessionWarning, match="INVALID, do not use"):
+        read(skinrig.Session(path))

@@ -136,6 +136,8 @@ fn a_copy_of_a_session_counts_once() {
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     skinrig(&["salvage", &session]).code(0);
     let copy = text(&only(&lab.path("s"), ".salvaged.session.sqlite"));
+    // Another one lies there without results.
+    std::fs::copy(&session, lab.path("s").join("a.session.sqlite")).unwrap();
     let output = skinrig(&["--json", "prototypes", &folder]).code(0);
     assert!(
         output.err.contains("is a copy of the session"),
@@ -148,8 +150,9 @@ fn a_copy_of_a_session_counts_once() {
     assert_eq!(
         points[0]["session"],
         session.as_str(),
-        "the sealed one stands for both"
+        "the sealed and analysed one stands for all"
     );
+    assert!(points[0]["rmse_mm"]["value"].is_number(), "{:#}", points[0]);
     skinrig(&["compare", &session, &copy])
         .code(2)
         .expect_stderr(&["or a copy of it"]);

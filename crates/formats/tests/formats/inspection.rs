@@ -68,6 +68,34 @@ fn a_raw_file_is_described() {
     assert_eq!((stream.last_us, stream.span_s()), (Some(0), None));
 }
 
+/// The second half of a recording, then the first: from its first event to its last is no span.
+#[test]
+fn a_recording_whose_time_steps_back_has_no_rate() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("swapped.raw");
+    let mut bytes = Vec::new();
+    for from_us in [50_000_000, 0] {
+        let mut encoder = Encoder::new(from_us);
+        for k in 0..100 {
+            let event = CdEvent {
+                t_us: from_us + k * 550_000,
+                x: 5,
+                y: 6,
+                polarity: Polarity::On,
+            };
+            encoder.cd(event, &mut bytes).unwrap();
+        }
+    }
+    let mut writer = RawWriter::create(&path, &RawMetadata::evk1("d", "00000007")).unwrap();
+    writer.write(&bytes).unwrap();
+    writer.finish().unwrap();
+
+    let stream = &inspect(&path, 1_000_000).unwrap().streams[0];
+    assert_eq!(stream.first_us, Some(50_000_000));
+    assert!(stream.last_us > Some(54_000_000), "{:?}", stream.last_us);
+    assert_eq!((stream.span_s(), stream.mean_rate_hz()), (None, None));
+}
+
 #[test]
 fn an_hdf5_file_is_described() {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
