@@ -103,6 +103,6 @@ def test_a_resumed_session(tmp_path):
 
 @pytest.mark.parametrize("read", [lambda s: s.presses, lambda s: s.results, lambda s: s.columns("presses")])
 def test_numbers_of_an_invalid_session_raise_a_warning(tmp_path, read):
-    path = skinrig.simulate(SMALL, tmp_path, {"analysis.alignment.max_residual": "1 ns"})
+    path = skinrig.simulate(SMALL, tmp_path, {"analysis.alignment.max_residual": "0.001 us"})
     with pytest.warns(skinrig.InvalidSessionWarning, match="INVALID, do not use"):
         read(skinrig.Session(path))
