@@ -57,7 +57,7 @@ macro_rules! question {
 const QUESTIONS: &[Question] = &[
     question!(
         "best-prototypes",
-        "Which prototypes have the lowest RMSE of left-out presses?",
+        "Which prototypes have the lowest RMSE where no press calibrated?",
         [MIN_SESSIONS, ANALYSIS]
     ),
     question!(

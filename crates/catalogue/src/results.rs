@@ -56,6 +56,8 @@ pub struct AnalysisFigures {
     pub bias_mm: [Option<f64>; 2],
     /// Standard deviation between repetitions, mm.
     pub repeat_std_mm: Option<f64>,
+    /// RMSE where no press calibrated, mm; `None`: not known.
+    pub left_out_rmse_mm: Option<f64>,
     /// Share of scored presses that were located.
     pub located_rate: Option<f64>,
     /// Fits between clocks.
@@ -115,25 +117,33 @@ struct Document {
     analysis: Analysis,
     provenance: Provenance,
     /// Lists of many sessions read it; without it the results are those of an older version.
-    #[serde(rename = "summary")]
-    _summary: Summary,
+    summary: Summary,
     valid: bool,
 }
 
 /// The part that a list of sessions shows. It does so for those alone that have all of it.
 #[derive(Deserialize)]
-#[expect(dead_code, reason = "only has to be there")]
 struct Summary {
-    session_id: String,
+    #[serde(rename = "session_id")]
+    _session_id: String,
+    #[serde(default, rename = "content_sha256")]
+    _content_sha256: Option<String>,
+    #[serde(rename = "analysis_version")]
+    _analysis_version: u32,
+    #[serde(rename = "results_hash")]
+    _results_hash: String,
+    #[serde(rename = "valid")]
+    _valid: bool,
+    #[serde(rename = "counts")]
+    _counts: IgnoredAny,
+    #[serde(rename = "rmse_mm")]
+    _rmse_mm: EstimateEntry,
     #[serde(default)]
-    content_sha256: Option<String>,
-    analysis_version: u32,
-    results_hash: String,
-    valid: bool,
-    counts: IgnoredAny,
-    rmse_mm: EstimateEntry,
-    repeat_std_mm: EstimateEntry,
-    located_rate: EstimateEntry,
+    left_out_rmse_mm: EstimateEntry,
+    #[serde(rename = "repeat_std_mm")]
+    _repeat_std_mm: EstimateEntry,
+    #[serde(rename = "located_rate")]
+    _located_rate: EstimateEntry,
 }
 
 #[derive(Deserialize)]
@@ -286,6 +296,7 @@ fn figures(
         p95_mm: scored.p95_mm.value,
         bias_mm: [scored.bias_x_mm.value, scored.bias_y_mm.value],
         repeat_std_mm: scored.repeat_std_mm.value,
+        left_out_rmse_mm: found.summary.left_out_rmse_mm.value,
         located_rate: scored.located_rate.value,
         clocks: analysis.alignment.maps,
         calibration: analysis.calibration.map(CalibrationEntry::from),

@@ -6,7 +6,7 @@ use sqlx::{Connection, SqlSafeStr};
 use crate::db::Db;
 
 /// All migrations, oldest first: version, description and SQL.
-pub(crate) const MIGRATIONS: [(i64, &str, &str); 2] = [
+pub(crate) const MIGRATIONS: [(i64, &str, &str); 3] = [
     (
         20261127000000,
         "catalogue",
@@ -16,6 +16,11 @@ pub(crate) const MIGRATIONS: [(i64, &str, &str); 2] = [
         20261128000000,
         "presses",
         include_str!("../../../migrations/catalogue/20261128000000_presses.sql"),
+    ),
+    (
+        20261129000000,
+        "left out",
+        include_str!("../../../migrations/catalogue/20261129000000_left_out.sql"),
     ),
 ];
 

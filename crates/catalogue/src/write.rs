@@ -326,7 +326,7 @@ async fn analysis(db: &mut Db, id: &str, entry: &AnalysisEntry) -> Result<(), sq
     };
     let rmse = figures.rmse_mm;
     let changed = serde_json::Value::from(figures.changed.clone()).to_string();
-    let values: [Bound; 16] = [
+    let values: [Bound; 17] = [
         id.into(),
         (&entry.name).into(),
         figures.version.into(),
@@ -343,11 +343,12 @@ async fn analysis(db: &mut Db, id: &str, entry: &AnalysisEntry) -> Result<(), sq
         figures.bias_mm[1].into(),
         figures.repeat_std_mm.into(),
         figures.located_rate.into(),
+        figures.left_out_rmse_mm.into(),
     ];
     db.execute(
         "INSERT INTO analysis (session_id, name, version, results_hash, is_valid, changed_json, rmse_mm, rmse_low_mm,
-             rmse_high_mm, rmse_n, median_mm, p95_mm, bias_x_mm, bias_y_mm, repeat_std_mm, located_rate)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16)",
+             rmse_high_mm, rmse_n, median_mm, p95_mm, bias_x_mm, bias_y_mm, repeat_std_mm, located_rate, left_out_rmse_mm)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17)",
         &values,
     )
     .await?;

@@ -186,36 +186,13 @@ pub fn disagreement(analysis: &Analysis) -> Option<String> {
     })
 }
 
-/// The error where no press calibrated, if the headline presses are at places that calibrated: that RMSE is measured where the
-/// calibration was fitted. From the locations that were left out of it one by one, with the chosen locator or model; `None` without
-/// a comparison of them, or when most of the headline presses are elsewhere.
+/// The error where no press calibrated, if the headline presses are at places that calibrated.
 #[must_use]
 pub(crate) fn rmse_elsewhere(analysis: &Analysis) -> Option<String> {
-    let a = analysis;
-    if a.recalibration.is_some() {
+    if !analysis.scores_calibrating_places()? {
         return None;
     }
-    let calibrating = a.presses.iter().filter(|p| p.role == PressRole::Calibrate);
-    let taught: BTreeSet<LocationId> = calibrating.map(|p| p.location).collect();
-    let counted = a.presses.iter().filter(|p| is_counted(p));
-    let (mut there, mut all) = (0, 0);
-    for press in counted {
-        there += usize::from(taught.contains(&press.location));
-        all += 1;
-    }
-    if 2 * there < all || all == 0 {
-        return None;
-    }
-    let by_locator = a.locator.as_ref().map(|l| &l.compared);
-    let by_locator = by_locator.and_then(|all| all.iter().find(|c| c.chosen));
-    let by_model = a.calibration.as_ref().map(|c| &c.compared);
-    let by_model = by_model.and_then(|all| all.iter().find(|c| c.chosen));
-    let rmse = match (by_locator, by_model) {
-        (Some(c), _) => &c.rmse_mm,
-        (None, Some(c)) => &c.rmse_mm,
-        (None, None) => return None,
-    };
-    rmse.value?;
+    let rmse = analysis.left_out_rmse()?;
     let (value, interval) = (number(rmse.value, 2), interval(rmse, 1.0, 2));
     Some(format!(
         "{value} mm {interval} where no press calibrated, n {} locations",

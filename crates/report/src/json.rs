@@ -49,6 +49,9 @@ pub struct Summary {
     pub counts: PressCounts,
     /// RMSE of the scored presses.
     pub rmse_mm: Estimate,
+    /// RMSE where no press calibrated, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_out_rmse_mm: Option<Estimate>,
     /// Std between repetitions.
     pub repeat_std_mm: Estimate,
     /// Share of scored presses that were located.
@@ -74,6 +77,7 @@ impl Summary {
                 .collect(),
             counts: analysis.counts,
             rmse_mm: scored.rmse_mm,
+            left_out_rmse_mm: analysis.left_out_rmse().copied(),
             repeat_std_mm: scored.repeat_std_mm,
             located_rate: scored.located_rate,
         }

@@ -13,6 +13,7 @@ mod evidence_tests;
 mod felt;
 mod indentation;
 mod latency;
+mod left_out;
 mod locator;
 mod motion;
 mod other_reading;

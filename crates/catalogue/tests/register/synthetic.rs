@@ -238,6 +238,7 @@ impl SyntheticLab {
                     ("yaw_2_deg".into(), Some(self.unit()), None),
                 ],
             }),
+            left_out_rmse_mm: self.is(90).then_some(1.25 * rmse),
             located_rate: Some(if self.is(95) { 0.97 } else { 0.49 }),
             ..AnalysisFigures::default()
         }

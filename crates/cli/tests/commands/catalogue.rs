@@ -133,6 +133,16 @@ fn the_catalogue_has_the_same_answers(s: &str, prototypes: &Value) {
         best[0]["best_rmse_mm"],
         prototypes[1]["series"][0]["best"]["value"]
     );
+    let left_out = points.iter().map(|point| {
+        let session = point["session"].as_str().unwrap();
+        let results =
+            crate::support::read_json(session.replace(".session.sqlite", ".results.json").as_ref());
+        let rmse = results["summary"]["left_out_rmse_mm"]["value"].as_f64();
+        rmse.unwrap()
+    });
+    let mean = left_out.sum::<f64>() / 2.0;
+    let answered = best[0]["left_out_rmse_mm"].as_f64().unwrap();
+    assert!((answered - mean).abs() < 1e-9, "{answered} {mean}");
     the_presses_are_those_of_the_results(&ask, points);
     assert_eq!(ask(&["tagged", "tag=good-skin"]).len(), 1);
     assert_eq!(

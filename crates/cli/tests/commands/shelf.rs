@@ -21,11 +21,7 @@ fn fill(lab: &Lab) -> &'static str {
     skinrig(&[&["run", SMALL, "--sessions", &s][..], &other].concat()).code(0);
     let none = ["--no-analysis", "--set", "prototype.id=skin C"];
     skinrig(&[&["run", SMALL, "--sessions", &s][..], &none].concat()).code(0);
-    let first = &files(&lab.path("s"), "-test-skin.session.sqlite")[0];
-    let (first, second) = (
-        text(first),
-        text(&files(&lab.path("s"), "-test-skin.session.sqlite")[1]),
-    );
+    let [first, second] = of_test_skin(&lab);
     let variant = ["--set", "analysis.min_samples=6", "--name", "six"];
     skinrig(&[&["analyze", &first][..], &variant].concat()).code(0);
     skinrig(&["tag", &first, "wet", "--note", "lamp", "--by", "Ann"]).code(0);
@@ -42,6 +38,13 @@ fn fill(lab: &Lab) -> &'static str {
     std::fs::write(lab.path("s/broken.session.sqlite"), "no session").unwrap();
     std::fs::write(lab.path("s/empty.session.sqlite"), "").unwrap();
     "six"
+}
+
+/// The two sessions of the test skin. If they began in the same second, their names differ by a number at the end.
+fn of_test_skin(lab: &Lab) -> [String; 2] {
+    let mut own = files(&lab.path("s"), ".session.sqlite");
+    own.retain(|file| text(file).contains("-test-skin"));
+    [0, 1].map(|at| text(&own[at]))
 }
 
 /// The answers of every command that lists a folder, as JSON, and what they say on standard error.
@@ -111,7 +114,7 @@ fn a_catalogue_changes_no_answer() {
 
     // Stale entries: a tag and results that came since, beside the catalogue's back.
     let before = std::fs::read(&file).unwrap();
-    let second = text(&files(&lab.path("s"), "-test-skin.session.sqlite")[1]);
+    let [_, second] = of_test_skin(&lab);
     skinrig(&["tag", &second, "wet"]).code(0);
     let third = only(&lab.path("s"), "-skin-c.session.sqlite");
     skinrig(&["analyze", &text(&third)]).code(0);
