@@ -1,10 +1,11 @@
 //! `skinrig plan --detect`: locations x repetitions needed to show a difference, from the variance of a session.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::json;
 use skinrig_analysis::Analysis;
-use skinrig_model::{HostDuration, PressRole, Verdict};
+use skinrig_model::{HostDuration, LocationId, PressRole, Verdict};
 use skinrig_statistics::Sample;
 use skinrig_statistics::power::{self, MetricVariance, PowerPlan, Target};
 use skinrig_text::{Column, Table};
@@ -35,11 +36,15 @@ pub(crate) fn propose(
     let refused = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", session.display()));
     let sample = errors(&analysis).map_err(|e| refused(&e))?;
     let measured = power::measure(&sample).map_err(|e| refused(&e))?;
+    let counting = Counting::of(&analysis);
     let target = Target {
         difference: difference_mm,
         power: args.power,
         alpha: args.alpha,
         common: args.common,
+        scatter: 1.0 + difference_mm / measured.value,
+        // The other skin may lose as many others.
+        counting: counting.share() * counting.share(),
         seconds_per_press: seconds_per_press(&analysis),
     };
     let plan = power::plan(&measured, &target).map_err(|e| refused(&e))?;
@@ -49,7 +54,7 @@ pub(crate) fn propose(
             "session": session, "metric": "rmse", "unit": "mm", "plan": plan, "presses_besides": others,
         }));
     } else {
-        print(&plan, others, session);
+        print(&plan, counting, others, session);
     }
     Ok(Exit::Ok)
 }
@@ -64,6 +69,35 @@ fn errors(analysis: &Analysis) -> Result<Sample, skinrig_statistics::SampleFault
         let (x, y) = p.error_mm()?;
         Some((p.location.index(), x.hypot(y)))
     }))
+}
+
+/// Scored locations of the session.
+#[derive(Clone, Copy)]
+struct Counting {
+    /// With a press that counts.
+    with: usize,
+    all: usize,
+}
+
+impl Counting {
+    fn of(analysis: &Analysis) -> Self {
+        let scored = || {
+            analysis
+                .presses
+                .iter()
+                .filter(|p| p.role == PressRole::Score)
+        };
+        let with = scored().filter(|p| p.verdict == Verdict::Valid && p.error_mm().is_some());
+        let number = |locations: BTreeSet<LocationId>| locations.len();
+        Self {
+            with: number(with.map(|p| p.location).collect()),
+            all: number(scored().map(|p| p.location).collect()),
+        }
+    }
+
+    fn share(self) -> f64 {
+        self.with as f64 / self.all as f64
+    }
 }
 
 /// Presses of the session that are not scored.
@@ -82,7 +116,7 @@ fn seconds_per_press(analysis: &Analysis) -> Option<f64> {
     gaps.get(gaps.len() / 2).copied().filter(|gap| *gap > 0.0)
 }
 
-fn print(plan: &PowerPlan, others: usize, session: &Path) {
+fn print(plan: &PowerPlan, counting: Counting, others: usize, session: &Path) {
     let Target {
         difference,
         power,
@@ -147,9 +181,11 @@ fn print(plan: &PowerPlan, others: usize, session: &Path) {
     outln!("");
     outln!("from {}", session.display());
     outln!("  RMSE {value:.3} mm at {locations} locations");
-    if difference > value {
+    let Counting { with, all } = counting;
+    if with < all {
         outln!(
-            "  the difference is larger than this RMSE: presses on the other skin must not scatter more than these"
+            "  {} of {all} locations have no press that counts: the proposals allow for as many on both skins",
+            all - with
         );
     }
     if locations < FEW_LOCATIONS {
@@ -173,6 +209,10 @@ fn print(plan: &PowerPlan, others: usize, session: &Path) {
     outln!(
         "  {} % of the variance between locations taken as common to both skins (--common)",
         shown(100.0 * common)
+    );
+    outln!(
+        "  the worse skin scatters in proportion to its RMSE: {} times these",
+        shown((plan.target.scatter * 100.0).round() / 100.0)
     );
     outln!(
         "  what changes from mounting to mounting is not known from one session: record each skin at least three times"

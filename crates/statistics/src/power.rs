@@ -34,6 +34,10 @@ pub struct Target {
     /// Share of the variance between locations that both skins have in common, 0..1. Use 0 when unknown; it requires the
     /// most presses.
     pub common: f64,
+    /// Standard deviations of the other skin relative to those measured: 1 if it is alike. An RMSE scatters in proportion to its value.
+    pub scatter: f64,
+    /// Share of the locations with a press that counts on both skins, more than 0 and at most 1: proposals have as many more.
+    pub counting: f64,
     /// Time per press, s; gives proposals a duration.
     pub seconds_per_press: Option<f64>,
 }
@@ -122,12 +126,25 @@ pub fn plan(measured: &MetricVariance, target: &Target) -> Result<PowerPlan, Com
             "a share from 0 to 1",
             (0.0..=1.0).contains(&target.common),
         ),
+        (
+            "scatter",
+            target.scatter,
+            "a number above 0",
+            above_zero(target.scatter),
+        ),
+        (
+            "counting",
+            target.counting,
+            "a share above 0 and at most 1",
+            target.counting > 0.0 && target.counting <= 1.0,
+        ),
     ] {
         if !good {
             return Err(ComparisonError::setting(name, expected, found));
         }
     }
-    let between = 2.0 * (1.0 - target.common) * measured.between;
+    let both = 1.0 + target.scatter * target.scatter;
+    let between = both * (1.0 - target.common) * measured.between;
     let tried: &[u32] = if measured.within.is_some() {
         &REPETITIONS
     } else {
@@ -136,7 +153,7 @@ pub fn plan(measured: &MetricVariance, target: &Target) -> Result<PowerPlan, Com
     let proposals: Vec<Proposal> = tried
         .iter()
         .filter_map(|&r| {
-            let variance = between + 2.0 * measured.within.unwrap_or(0.0) / f64::from(r);
+            let variance = between + both * measured.within.unwrap_or(0.0) / f64::from(r);
             proposal(variance, r, target)
         })
         .collect();
@@ -173,9 +190,11 @@ fn proposal(variance: f64, repetitions: u32, target: &Target) -> Option<Proposal
             low = middle + 1;
         }
     }
-    let presses = low.checked_mul(repetitions)?;
+    let locations = (f64::from(low) / target.counting).ceil();
+    let locations = (locations <= f64::from(MAX_LOCATIONS)).then_some(locations as u32)?;
+    let presses = locations.checked_mul(repetitions)?;
     Some(Proposal {
-        locations: low,
+        locations,
         repetitions,
         presses,
         half_width: quantiles(low).0 * error(low),
