@@ -80,6 +80,9 @@ pub enum Reaction {
     Lift,
 }
 
+/// Least number of calibration presses of which an online estimator learns 95 % regions.
+pub const LEAST_PRESSES_OF_REGIONS: usize = 24;
+
 impl Reaction {
     /// What a press does, as a verb.
     #[must_use]

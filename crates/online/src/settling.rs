@@ -124,6 +124,7 @@ impl Settling {
 mod tests {
     use proptest::prelude::*;
     use rand_xoshiro::Xoshiro256PlusPlus;
+    use skinrig_model::LEAST_PRESSES_OF_REGIONS;
     use skinrig_statistics::seeded;
 
     use super::*;
@@ -177,9 +178,11 @@ mod tests {
     #[test]
     fn too_few_presses_give_no_region() {
         let mut rng = seeded::generator(1, 3);
-        let courses: Vec<Course> = (0..24).map(|_| course(&mut rng)).collect();
+        // Protocols refuse a region of fewer.
+        let enough = LEAST_PRESSES_OF_REGIONS;
+        let courses: Vec<Course> = (0..enough).map(|_| course(&mut rng)).collect();
         assert!(Settling::learn(&courses).is_some());
-        assert_eq!(Settling::learn(&courses[..23]), None);
+        assert_eq!(Settling::learn(&courses[..enough - 1]), None);
         assert_eq!(Settling::learn(&[]), None);
     }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use skinrig_model::level_bias::{is_measured_for, is_measured_over, is_measured_with};
 use skinrig_model::pulse::MAX_MARKED_PRESS;
-use skinrig_model::{PulseTrain, SimLevel, SkinOutline, StereoGeometry};
+use skinrig_model::{PressRole, PulseTrain, SimLevel, SkinOutline, StereoGeometry};
 use skinrig_settings::{Collector, Diagnostics, Field, Finding, Settings, Span, open};
 
 use crate::file::hex;
@@ -196,6 +196,12 @@ fn assemble(
         let field = root.at("calibrate_at");
         keys.choose(&locations, &roles, &cameras, field, out)
     })?;
+    if let Some(Some(react)) = online.as_ref().map(|o| o.as_ref().and_then(|o| o.react)) {
+        let places = calibrate_at.as_ref().map_or(locations.len(), Vec::len);
+        let calibrating = roles.iter().filter(|r| **r == PressRole::Calibrate).count();
+        let presses = places * depths_mm.len() * calibrating;
+        react.can_act(presses, root.at("online.react"), out);
+    }
     let sync = declared(keys.sync, |keys| sync(&keys, outline, &depths_mm))?;
     let presses = locations.len() as u64 * depths_mm.len() as u64 * roles.len() as u64
         + sync.as_ref().map_or(0, |s: &Sync| u64::from(s.count));

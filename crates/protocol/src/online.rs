@@ -1,7 +1,7 @@
 //! Touch felt while a session is recorded: how, and what presses do then.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{HostDuration, PressRole, Reaction};
+use skinrig_model::{HostDuration, LEAST_PRESSES_OF_REGIONS, PressRole, Reaction};
 use skinrig_settings::{Collector, Field, Settings};
 
 /// Feels touches while the session is recorded. The calibrating repetitions teach it; it feels from the first scored press on.
@@ -52,6 +52,22 @@ pub struct React {
     /// The longer semi-axis of the position's region is at most this, mm; `None`: a touch is felt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region_mm: Option<f64>,
+}
+
+impl React {
+    /// Reports a region that is never known: so many presses calibrate.
+    pub(crate) fn can_act(&self, calibrating: usize, field: &Field, out: &mut Collector) {
+        if self.region_mm.is_none() || calibrating >= LEAST_PRESSES_OF_REGIONS {
+            return;
+        }
+        let at = field.at("region");
+        out.error(at.span, at.path.as_str(), "no press would react")
+            .expected(format!(
+                "at least {LEAST_PRESSES_OF_REGIONS} calibration presses, which teach how far a position may be off"
+            ))
+            .found(calibrating.to_string())
+            .help("calibrate with more repetitions or locations, or remove `region`: presses then react as soon as they are felt");
+    }
 }
 
 impl OnlineKeys {

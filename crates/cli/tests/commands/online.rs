@@ -211,10 +211,24 @@ fn another_program_follows_what_is_felt() {
 #[test]
 fn presses_that_do_not_react_are_named_beside_the_answer() {
     let lab = Lab::new();
-    let session = session_with(
-        &lab,
-        &["--set", "online.react={then: stop, region: 1e-9 mm}"],
-    );
+    // Of fewer presses no region is learnt, and the protocol is refused.
+    let session = text(&lab.record(
+        "s",
+        &[
+            "--set",
+            "analysis.calibration=positions",
+            "--set",
+            "analysis.bootstrap_resamples=50",
+            "--set",
+            "repetitions.count=7",
+            "--set",
+            "evaluation.calibrate=[1-6]",
+            "--set",
+            "evaluation.score=[7]",
+            "--set",
+            "online.react={then: stop, region: 1e-9 mm}",
+        ],
+    ));
     let output = skinrig(&["analyze", &session]).code(0);
     let text = "asks presses to stop when they are felt: 0 of 4 valid scored presses did";
     let lines: Vec<&str> = output.out.lines().map(str::trim).collect();

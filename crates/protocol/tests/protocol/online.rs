@@ -54,6 +54,25 @@ fn it_is_learnt_before_the_first_scored_repetition_and_only_scored_presses_react
 }
 
 #[test]
+fn a_region_that_is_never_known_is_refused() {
+    let react = |columns: &str, react: &str| {
+        let size = [columns, "path.meander.rows=4"];
+        with(&format!("online: {{react: {{{react}}}}}"), &size)
+    };
+    let few = react("path.meander.columns=5", "then: lift, region: 3 mm").unwrap_err();
+    let few = few.to_string();
+    for part in [
+        "online.react.region",
+        "at least 24 calibration presses",
+        "= found: 20",
+    ] {
+        assert!(few.contains(part), "{few}");
+    }
+    react("path.meander.columns=6", "then: lift, region: 3 mm").unwrap();
+    react("path.meander.columns=5", "then: lift").unwrap();
+}
+
+#[test]
 fn a_further_leg_learns_only_if_it_presses_everything_again() {
     let plan = with("online: {}", &[]).unwrap().compile();
     assert_eq!(plan.remaining(|_| true, Route::Straight), plan);
