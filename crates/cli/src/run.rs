@@ -149,8 +149,12 @@ fn new_session(
                     file.push(ending);
                     let _ = std::fs::remove_file(file);
                 }
+                let next = match path.to_str() {
+                    Some(_) => "a writable folder with enough space",
+                    None => "a folder whose path is UTF-8 text",
+                };
                 return Err(Failure::internal(format!(
-                    "{error}\n  next: choose a writable folder with enough space with --sessions"
+                    "{error}\n  next: choose {next} with --sessions"
                 )));
             }
         }

@@ -447,3 +447,17 @@ fn digits_are_printed_below_the_answer_and_listed_in_json() {
     assert!(figures.len() > 100, "{}", figures.len());
     skinrig(&["analyze", &session, "--digits=0"]).code(2);
 }
+
+/// SQLite takes text alone.
+#[test]
+fn a_folder_whose_name_is_no_text_needs_another_name() {
+    use std::ffi::{OsStr, OsString};
+    use std::os::unix::ffi::OsStrExt;
+    let lab = Lab::new();
+    let folder = lab.path("").join(OsStr::from_bytes(b"bad\xff"));
+    let arguments = ["run", SMALL, "--sessions"].map(OsString::from);
+    let arguments = [&arguments[..], &[folder.into_os_string()]].concat();
+    skinrig(&arguments)
+        .code(1)
+        .expect_stderr(&["next: choose a folder whose path is UTF-8 text with --sessions"]);
+}

@@ -21,7 +21,7 @@ fn fill(lab: &Lab) -> &'static str {
     skinrig(&[&["run", SMALL, "--sessions", &s][..], &other].concat()).code(0);
     let none = ["--no-analysis", "--set", "prototype.id=skin C"];
     skinrig(&[&["run", SMALL, "--sessions", &s][..], &none].concat()).code(0);
-    let [first, second] = of_test_skin(&lab);
+    let [first, second] = of_test_skin(lab);
     let variant = ["--set", "analysis.min_samples=6", "--name", "six"];
     skinrig(&[&["analyze", &first][..], &variant].concat()).code(0);
     skinrig(&["tag", &first, "wet", "--note", "lamp", "--by", "Ann"]).code(0);
