@@ -7,16 +7,12 @@ use super::readings::{Path, ScoredReading};
 use super::resection::{MIN_SPREAD_DEG, residual_deg};
 use super::statistics::median;
 
-/// Radius of the neighbourhood in distances between locations: it holds presses of the lines beside a press.
+/// Radius of the neighbourhood in steps of the path: it holds presses of the lines beside a press.
 const RADIUS_STEPS: f64 = 2.2;
-/// Standard deviation of the neighbours' weights in such distances.
+/// Standard deviation of the neighbours' weights in steps.
 const WEIGHT_STEPS: f64 = 1.25;
 /// Minimum number of neighbours.
 const MIN_NEIGHBOURS: usize = 4;
-/// Maximum number of neighbours; of more, every n-th is used.
-const MAX_NEIGHBOURS: usize = 200;
-/// Number of presses whose nearest location tells how far apart locations are.
-const SAMPLED: usize = 200;
 
 /// The quarter of the absolute values of a normal distribution with standard deviation 1.
 const QUARTER_OF_SIGMA: f64 = 0.3186;
@@ -25,17 +21,12 @@ const QUARTER_OF_SIGMA: f64 = 0.3186;
 pub(super) struct Neighbours(Vec<Vec<(usize, f64)>>);
 
 impl Neighbours {
-    /// `None` for a single location.
+    /// `None` for a path that does not move.
     pub(super) fn new(path: &Path<'_>) -> Option<Self> {
-        let at: Vec<Point2> = path.presses_seen.iter().map(|t| t.planned).collect();
+        let at: Vec<Point2> = path.presses_seen.iter().map(|t| t.at()).collect();
         let distance = |a: Point2, b: Point2| libm::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm);
-        // Not from press to press: a shuffled path jumps over the whole skin.
-        let nearest = at.iter().step_by(at.len().div_ceil(SAMPLED).max(1));
-        let nearest = nearest.filter_map(|own| {
-            let others = at.iter().map(|other| distance(*own, *other));
-            others.filter(|away| *away > 0.0).min_by(f64::total_cmp)
-        });
-        let step = median(nearest.collect())?;
+        let steps = at.windows(2).map(|pair| distance(pair[0], pair[1]));
+        let step = median(steps.collect()).filter(|step| *step > 0.0)?;
         let mut by_x: Vec<usize> = (0..at.len()).collect();
         by_x.sort_by(|a, b| at[*a].x_mm.total_cmp(&at[*b].x_mm));
         let radius = RADIUS_STEPS * step;
@@ -45,16 +36,11 @@ impl Neighbours {
                 .iter()
                 .copied()
                 .take_while(|j| at[*j].x_mm <= at[i].x_mm + radius);
-            let near: Vec<(usize, f64)> = near
-                .filter(|j| *j != i)
+            near.filter(|j| *j != i)
                 .map(|j| (j, distance(at[i], at[j])))
                 .filter(|(_, away)| *away <= radius)
-                .collect();
-            let kept = near
-                .iter()
-                .step_by(near.len().div_ceil(MAX_NEIGHBOURS).max(1));
-            let weight = |away: f64| libm::exp(-0.5 * (away / (WEIGHT_STEPS * step)).powi(2));
-            kept.map(|(j, away)| (*j, weight(*away))).collect()
+                .map(|(j, away)| (j, libm::exp(-0.5 * (away / (WEIGHT_STEPS * step)).powi(2))))
+                .collect()
         };
         Some(Self((0..at.len()).map(of).collect()))
     }
