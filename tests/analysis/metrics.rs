@@ -223,3 +223,30 @@ proptest! {
         prop_assert_eq!(second.repeat_std_mm.value.map(|v| v < 1e-9), Some(true));
     }
 }
+
+/// Where the headline presses are at calibrating locations, their RMSE is that of places the calibration knows.
+#[test]
+fn the_left_out_rmse_is_of_locations_that_did_not_calibrate() {
+    let (input, events) = skinrig_planted::grid::session();
+    let mut analysis = skinrig_analysis::analyze(&input, &events).unwrap();
+    assert_eq!(analysis.scores_calibrating_places(), Some(true));
+    let compared = &analysis.locator.as_ref().unwrap().compared;
+    let chosen = compared.iter().find(|c| c.chosen).unwrap().rmse_mm;
+    assert!(chosen.value.is_some() && chosen != analysis.scored.rmse_mm);
+    assert_eq!(analysis.left_out_rmse(), Some(&chosen));
+
+    let calibrating = analysis.presses.iter_mut();
+    for press in calibrating.filter(|p| p.role == PressRole::Calibrate) {
+        press.location = LocationId::from_index(1000 + press.location.index());
+    }
+    assert_eq!(analysis.scores_calibrating_places(), Some(false));
+    assert_eq!(analysis.left_out_rmse(), Some(&analysis.scored.rmse_mm));
+
+    // No press counts.
+    analysis
+        .presses
+        .iter_mut()
+        .for_each(|p| p.verdict = Verdict::Excluded);
+    assert_eq!(analysis.scores_calibrating_places(), None);
+    assert_eq!(analysis.left_out_rmse(), None);
+}
