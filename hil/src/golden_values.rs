@@ -34,7 +34,7 @@ const PRESS_METRICS: [&str; 8] = [
 /// `lost_bytes` is by camera.
 pub(crate) fn add(analysis: &Analysis, lost_bytes: [u64; 2], findings: &mut Findings) {
     golden_evidence::add(analysis, lost_bytes, findings);
-    // Without clocks no event can be assigned to a press, and what the audit finds makes the presses others than stated: deeper, displaced.
+    // Without clocks no event can be assigned to a press. After a finding the presses are not those stated: deeper, displaced.
     if !(analysis.is_valid() && analysis.findings.is_empty()) {
         for metric in PRESS_METRICS {
             findings.unmeasured(SKIN, metric);

@@ -211,7 +211,7 @@ fn print(plan: &PowerPlan, counting: Counting, others: usize, session: &Path) {
         shown(100.0 * common)
     );
     outln!(
-        "  the worse skin scatters in proportion to its RMSE: {} times these",
+        "  errors are assumed to scatter in proportion to the RMSE: on the worse skin {} times as much",
         shown((plan.target.scatter * 100.0).round() / 100.0)
     );
     outln!(

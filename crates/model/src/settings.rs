@@ -412,11 +412,11 @@ pub struct AnalysisSettings {
     /// Side of the square pixel bins of the estimator: 1, 2, 4, 8 or 16 px.
     #[setting(default = "1 px", min = 1, max = 16)]
     pub bin_px: u16,
-    /// The press window ends at most this long after the measured contact; absent: only the release ends it.
+    /// The press window ends at most this long after the measured contact; absent: the release or `window_after_depth` ends it.
     #[setting(min = NANOSECOND_MS, max = 60_000.0)]
     pub window_after_contact_ms: Option<f64>,
-    /// The press window ends at most this long after the tip reached its depth: the rest of a long hold adds noise alone. Without effect
-    /// on windows about the middle of the press.
+    /// The press window ends at most this long after the tip reached its depth: the rest of a long hold adds only noise. It does not
+    /// apply to windows about the middle of the press.
     #[setting(default = "1 s", min = NANOSECOND_MS, max = 60_000.0)]
     pub window_after_depth_ms: f64,
     /// Anchor of the press window.

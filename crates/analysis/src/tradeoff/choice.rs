@@ -11,7 +11,7 @@ const FACTORS: [u32; 11] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024];
 const SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
 /// Ends of the window after contact, ms.
 const WINDOWS_MS: [f64; 5] = [10.0, 20.0, 50.0, 100.0, 200.0];
-/// Longer than any press: a window that ends only with the release.
+/// Longer than any window: the contact does not end it.
 pub(crate) const WHOLE_PRESS_MS: f64 = 60_000.0;
 
 /// Length of a press in distances between windows, ms.

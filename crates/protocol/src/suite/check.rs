@@ -18,7 +18,7 @@ pub(super) fn skip_reason(field: &Field, out: &mut Collector) -> Option<String> 
             .iter()
             .any(|word| text.eq_ignore_ascii_case(word));
     if !is_reason {
-        out.error(field.span, field.path.as_str(), "this is no reason")
+        out.error(field.span, field.path.as_str(), "this is not a reason")
             .expected("why the check is skipped")
             .found(format!("`{text}`"))
             .help("write for example `skip: lamp is being repaired`, or remove the line to run the check");
