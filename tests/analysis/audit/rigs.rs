@@ -57,6 +57,10 @@ pub(crate) struct SessionOptions {
     pub drift_ppm: Option<f64>,
     /// Minimum number of locations.
     pub places: usize,
+    /// Amplitude of an error of the skin that bends slowly over it, columns.
+    pub bent_px: f64,
+    /// Share of the session after which camera 2 sees the next press of the path instead.
+    pub early_from: Option<f64>,
     /// Number of repetitions (0: from the seed).
     pub repetitions: u32,
     /// Standard deviation of what the skin displaces the columns at each location, alike in every repetition, px.
@@ -95,7 +99,8 @@ fn camera(at: (f64, f64), skew_deg: f64, w: f64) -> skinrig_model::CameraModel {
 fn path(random: &mut Random, least: usize) -> Vec<Point2> {
     let kinds = [3usize, 4, 5];
     let n = kinds[random.below(3)];
-    let n = if n * n < least { 5 } else { n };
+    let side = (least as f64).sqrt().ceil() as usize;
+    let n = if n * n < least { side.max(5) } else { n };
     let c = SkinOutline::PAPER.centre;
     if random.below(4) == 0 && least < 20 {
         let on = |i: usize| {
@@ -231,10 +236,12 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
         }
         for (k, events) in events.iter_mut().enumerate() {
             let at = if k == 1 && role != PressRole::Sync {
-                path[(location as usize + wishes.rows_late) % path.len()]
+                let early = wishes.early_from.is_some_and(|s| contact > s * end_s);
+                path[(location as usize + wishes.rows_late + usize::from(early)) % path.len()]
             } else {
                 at
             };
+            let bent = wishes.bent_px * (0.09 * at.x_mm + k as f64).sin() * (0.07 * at.y_mm).cos();
             let Some(u) = truth.cameras[k].column_of_point(at) else {
                 continue;
             };
@@ -249,7 +256,7 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
             };
             let missed = role != PressRole::Sync && random.unit() < miss;
             let skin = uneven[location as usize][k];
-            let centre = u + moved + skin + 3.0 * random.normal();
+            let centre = u + moved + skin + bent + 3.0 * random.normal();
             for n in 0..if missed { 0 } else { strength } {
                 let after = if 3 * n < 2 * strength {
                     0.1 * random.unit()

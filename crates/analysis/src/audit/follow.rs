@@ -12,7 +12,7 @@ use super::observed_press::ObservedPress;
 use super::readings::{MIN_SPREAD_DEG, Path, Reading, ScoredReading};
 use super::rearranged::rearranged_rows;
 use super::resection::{residuals, spread_deg};
-use super::segments::shifted_segment;
+use super::segments::{ShiftedSegment, locally_shifted_segment, shifted_segment};
 use super::statistics::median;
 use crate::result::{Analysis, Evidence, Fault, Finding, Law};
 
@@ -58,17 +58,16 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     readings.extend(path.displaced(&as_is));
     readings.push(path.as_planned());
     readings.extend(path.streams_apart());
-    if let Some(finding) = another_reading(&path, &as_is, &readings) {
+    if let Some((fault, best)) = likelier(&path, &as_is, &readings) {
         // Cameras on one side of the skin see another scale much as another origin.
-        if finding.fault == Fault::PositionsDisplaced {
-            readings.extend(path.stretched());
-            return another_reading(&path, &as_is, &readings)
-                .into_iter()
-                .collect();
-        }
-        return vec![finding];
+        let stretched = match fault {
+            Fault::PositionsDisplaced => path.stretched(),
+            _ => Vec::new(),
+        };
+        let (fault, best) = likelier(&path, &best, &stretched).unwrap_or((fault, best));
+        return vec![other_reading(&path, &as_is, &best, fault)];
     }
-    if let Some(finding) = shifted_later(&path, &as_is) {
+    if let Some(finding) = shifted_later(&path, |cameras| shifted_segment(&path, &as_is, cameras)) {
         return vec![finding];
     }
     if path.places < MANY_PLACES {
@@ -77,8 +76,8 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     if let Some(finding) = rearranged(&path, &as_is) {
         return vec![finding];
     }
-    if let Some(finding) = another_reading(&path, &as_is, &path.stretched()) {
-        return vec![finding];
+    if let Some((fault, best)) = likelier(&path, &as_is, &path.stretched()) {
+        return vec![other_reading(&path, &as_is, &best, fault)];
     }
     let lost: Vec<CameraId> = CameraId::ALL
         .into_iter()
@@ -86,6 +85,13 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
         .collect();
     if !lost.is_empty() {
         return not_following(analysis, &path, &as_is, &lost);
+    }
+    // Neighbours of a press tell a step of the path only where both streams follow the presses.
+    if as_is.follows(FOLLOWS) {
+        let locally = |cameras: &[usize]| locally_shifted_segment(&path, &as_is, cameras);
+        if let Some(finding) = shifted_later(&path, locally) {
+            return vec![finding];
+        }
     }
     CameraId::ALL
         .into_iter()
@@ -117,12 +123,12 @@ fn one_camera_twice(presses_seen: &[ObservedPress<'_>]) -> Option<Finding> {
     })
 }
 
-/// The likeliest of these readings, if it is clearly likelier than the session as recorded and explains it.
-fn another_reading(
+/// The likeliest of these readings, if it is clearly likelier than `than` and explains the session, with its fault.
+fn likelier<'a>(
     path: &Path<'_>,
-    as_is: &ScoredReading<'_>,
-    readings: &[Reading],
-) -> Option<Finding> {
+    than: &ScoredReading<'_>,
+    readings: &'a [Reading],
+) -> Option<(Fault, ScoredReading<'a>)> {
     let judged = readings.iter().map(|r| path.score(r));
     let reorders = |j: &ScoredReading<'_>| {
         let fault = j.reading.fault;
@@ -130,23 +136,30 @@ fn another_reading(
     };
     let best = judged
         .filter(|j| j.follows(FOLLOWS))
-        .filter(|j| !reorders(j) || path.moved_presses_prefer(as_is, j))
+        .filter(|j| !reorders(j) || path.moved_presses_prefer(than, j))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-    let gain = as_is.cost - best.cost;
     let fault = best.reading.fault?;
-    (gain > CLEARLY).then(|| {
-        let evidence = Evidence::OtherReading {
-            off_deg: off_deg(as_is),
-            other_off_deg: off_deg(&best),
-            reading: best.reading.what,
-            log_odds: gain,
-            places: path.places,
-        };
-        let mut found = finding(Law::CentroidFollowsPosition, fault, None, evidence);
-        // The cameras confirm the plan instead of the measurement.
-        found.invalidates = true;
-        found
-    })
+    (than.cost - best.cost > CLEARLY).then_some((fault, best))
+}
+
+/// The session as recorded has this fault: another reading explains it.
+fn other_reading(
+    path: &Path<'_>,
+    as_is: &ScoredReading<'_>,
+    best: &ScoredReading<'_>,
+    fault: Fault,
+) -> Finding {
+    let evidence = Evidence::OtherReading {
+        off_deg: off_deg(as_is),
+        other_off_deg: off_deg(best),
+        reading: best.reading.what,
+        log_odds: as_is.cost - best.cost,
+        places: path.places,
+    };
+    let mut found = finding(Law::CentroidFollowsPosition, fault, None, evidence);
+    // The cameras confirm the plan instead of the measurement.
+    found.invalidates = true;
+    found
 }
 
 /// Robust standard deviations of both streams about their best-fitting cameras.
@@ -154,10 +167,13 @@ fn off_deg(judged: &ScoredReading<'_>) -> [Option<f64>; 2] {
     judged.fits.map(|f| f.map(|f| f.spread_deg))
 }
 
-/// A shift that starts at some press, in both streams or in one.
-fn shifted_later(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> {
-    let both = shifted_segment(path, as_is, &[0, 1]);
-    let alone = [0, 1].map(|k| shifted_segment(path, as_is, &[k]));
+/// A shift that starts at some press, in both streams or in one, of what `segment` finds in the streams of some cameras.
+fn shifted_later(
+    path: &Path<'_>,
+    segment: impl Fn(&[usize]) -> Option<ShiftedSegment>,
+) -> Option<Finding> {
+    let both = segment(&[0, 1]);
+    let alone = [0, 1].map(|k| segment(&[k]));
     let (rest, camera) = match (both, alone) {
         // A shift in one stream is a clock fault; a faulty press list shifts both.
         (_, [Some(rest), None]) => (rest, Some(CameraId::One)),

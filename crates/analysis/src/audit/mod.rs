@@ -17,6 +17,7 @@ mod fixed_pixel;
 mod follow;
 mod frames;
 mod height;
+mod local;
 mod mark_step;
 mod observed_press;
 mod order;

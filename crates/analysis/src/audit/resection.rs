@@ -18,7 +18,7 @@ const PRIOR: [f64; PARAMETERS] = [5.0, 5.0, 2.5, 0.2, 0.05];
 /// Maximum number of independent locations: errors of a skin are correlated between neighbours.
 const MAX_PLACES: f64 = 25.0;
 /// Lower bound of the angle uncertainty, degrees: half a degree is 5 columns.
-const MIN_SPREAD_DEG: f64 = 0.5;
+pub(super) const MIN_SPREAD_DEG: f64 = 0.5;
 /// Standard deviation of a normal distribution divided by its median absolute value.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 /// Residuals of this many standard deviations have half weight.

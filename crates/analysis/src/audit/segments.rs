@@ -2,6 +2,7 @@
 
 use skinrig_model::Point2;
 
+use super::local::{LocalResiduals, Neighbours};
 use super::readings::{MAX_SHIFT, Path, ScoredReading};
 use super::resection::residual_deg;
 
@@ -41,25 +42,63 @@ pub(crate) fn shifted_segment(
     as_is: &ScoredReading<'_>,
     cameras: &[usize],
 ) -> Option<ShiftedSegment> {
+    let whole = |i: usize, by: i32| -> f64 {
+        let one = |k: &usize| {
+            let reading = path.presses_seen[i].sights[*k].column.zip(as_is.fits[*k]);
+            match (reading, path.shifted(i, by)) {
+                (Some((column, fit)), Some(at)) => {
+                    evidence(residual_deg(&fit.camera, column, at) / fit.spread_deg)
+                }
+                // Beyond the list: maximum evidence against; not visible: no evidence.
+                (Some(_), None) => MAX_PRESS,
+                (None, _) => 0.0,
+            }
+        };
+        cameras.iter().map(one).sum()
+    };
+    best_segment(path, cameras, whole)
+}
+
+/// As [`shifted_segment`], by residuals against those of the neighbours: the errors of a real skin may be larger than a step of the path.
+pub(crate) fn locally_shifted_segment(
+    path: &Path<'_>,
+    as_is: &ScoredReading<'_>,
+    cameras: &[usize],
+) -> Option<ShiftedSegment> {
+    let neighbours = Neighbours::new(path)?;
+    let shifts: Vec<i32> = (-MAX_SHIFT..=MAX_SHIFT).collect();
+    let residuals: Vec<LocalResiduals> = cameras
+        .iter()
+        .map(|k| LocalResiduals::new(path, as_is, &neighbours, *k, &shifts))
+        .collect::<Option<_>>()?;
+    best_segment(path, cameras, |i, by| {
+        let index = (by + MAX_SHIFT) as usize;
+        let one = |of: &LocalResiduals| {
+            let none = of.sigmas(i, MAX_SHIFT as usize);
+            match (none, of.sigmas(i, index)) {
+                (Some(_), Some(off)) => evidence(off),
+                (Some(_), None) => MAX_PRESS,
+                // Without neighbours in view: no evidence.
+                (None, _) => 0.0,
+            }
+        };
+        residuals.iter().map(one).sum()
+    })
+}
+
+/// Evidence against a shift of one press in one camera, nats.
+fn evidence(sigmas: f64) -> f64 {
+    (0.5 * sigmas * sigmas).min(MAX_PRESS)
+}
+
+/// The likeliest shifted part by the loss of each press with each shift in these cameras, nats.
+fn best_segment(
+    path: &Path<'_>,
+    cameras: &[usize],
+    loss: impl Fn(usize, i32) -> f64,
+) -> Option<ShiftedSegment> {
     let n = path.presses_seen.len();
     let shifts: Vec<i32> = (-MAX_SHIFT..=MAX_SHIFT).collect();
-    let loss = |i: usize, by: i32| -> f64 {
-        cameras
-            .iter()
-            .map(|k| {
-                let reading = path.presses_seen[i].sights[*k].column.zip(as_is.fits[*k]);
-                match (reading, path.shifted(i, by)) {
-                    (Some((column, fit)), Some(at)) => {
-                        let off = residual_deg(&fit.camera, column, at) / fit.spread_deg;
-                        (0.5 * off * off).min(MAX_PRESS)
-                    }
-                    // Beyond the list: maximum evidence against; not visible: no evidence.
-                    (Some(_), None) => MAX_PRESS,
-                    (None, _) => 0.0,
-                }
-            })
-            .sum()
-    };
     // Backwards: for each shift, its gain against none from each press onwards, and the best end of it.
     let may_end = cameras.len() == 2;
     let mut gains = vec![(0.0, n); shifts.len()];
