@@ -67,19 +67,8 @@ pub struct Failure {
     pub exit: Exit,
     /// Complete message for standard error, without the end of line.
     pub message: String,
-    /// True if a file is not a session or is damaged.
+    /// True if a file is not a session, is damaged, or was changed after it was recorded.
     pub is_damage: bool,
-}
-
-/// True if `error` means that a file is not a session or is damaged.
-fn is_damage(error: &RecorderError) -> bool {
-    matches!(
-        error,
-        RecorderError::Damaged { .. }
-            | RecorderError::NotASession { .. }
-            | RecorderError::Empty { .. }
-            | RecorderError::Unsound { .. }
-    )
 }
 
 impl Failure {
@@ -114,7 +103,7 @@ impl Failure {
 
     /// A session that could not be read: bad input, unless the machine failed.
     pub fn session(error: RecorderError) -> Self {
-        let is_damage = is_damage(&error);
+        let is_damage = error.is_damage();
         let failure = if error.is_system_failure() {
             Self::internal(error)
         } else {
@@ -155,7 +144,7 @@ impl From<ResultsError> for Failure {
                 let source = std::error::Error::source(&other);
                 let recorder = source.and_then(|s| s.downcast_ref::<RecorderError>());
                 Self {
-                    is_damage: recorder.is_some_and(is_damage),
+                    is_damage: recorder.is_some_and(RecorderError::is_damage),
                     ..Self::input(&other)
                 }
             }

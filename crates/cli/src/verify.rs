@@ -259,7 +259,9 @@ fn presses(presses: PressTally, sync: PressTally) -> String {
 
 /// Recomputes everything in a session.
 fn check(path: &Path) -> Result<VerifyReport, Failure> {
-    if let Err(e @ RecorderError::NotASession { .. }) = SessionReader::open(path) {
+    if let Err(e @ (RecorderError::NotASession { .. } | RecorderError::NewerSchema { .. })) =
+        SessionReader::open(path)
+    {
         return Err(Failure::session(e));
     }
     let _phase = Phase::begin("checking every byte");
@@ -301,7 +303,8 @@ fn outcome(name: &impl Display, report: &VerifyReport) -> Outcome {
         Ok(Exit::Ok)
     } else {
         Err(Failure::limit(format!(
-            "{name}: {} problem(s); the file is not what was recorded",
+            "{name}: {} problem(s); the file is not what was recorded\n  next: restore it from a copy, or copy its intact part into a new \
+            session: `skinrig salvage {name}`",
             report.problems.len() as u64 + report.more_problems
         )))
     }

@@ -7,6 +7,9 @@ use std::time::Duration;
 
 use crate::problem::Problem;
 
+/// What to do with a damaged session file.
+const NEXT_OF_DAMAGE: &str = "; restore the file from a copy, or copy its intact part into a new session with `skinrig salvage`";
+
 /// Failure to write or read a session.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -22,7 +25,7 @@ pub enum RecorderError {
         source: std::io::Error,
     },
     /// A SQLite call failed.
-    #[error("{}: {doing}: {source}", path.display())]
+    #[error("{}: {doing}: {source}{}", path.display(), if is_malformed(source) { NEXT_OF_DAMAGE } else { "" })]
     Sql {
         /// The session file.
         path: PathBuf,
@@ -180,7 +183,7 @@ pub enum RecorderError {
         found: String,
     },
     /// The file is damaged or contradicts itself.
-    #[error("{}: damaged: {place}: expected {expected}, found {found}; `skinrig verify` checks everything", path.display())]
+    #[error("{}: damaged: {place}: expected {expected}, found {found}{NEXT_OF_DAMAGE}", path.display())]
     Damaged {
         /// The session file.
         path: PathBuf,
@@ -302,12 +305,42 @@ impl RecorderError {
                 other => matches!(other, Self::Unread(_)),
             };
         };
-        let sqlx::Error::Database(error) = &**source else {
-            return matches!(&**source, sqlx::Error::Io(_));
-        };
-        let code: i32 = error.code().and_then(|c| c.parse().ok()).unwrap_or(0);
-        matches!(code & 0xff, 3 | 5 | 6 | 7 | 8 | 10 | 13 | 14) && code != 522
+        if matches!(&**source, sqlx::Error::Io(_)) {
+            return true;
+        }
+        let code = code_of(source);
+        matches!(code & 0xff, 3 | 5 | 6 | 7 | 8 | 10 | 13 | 14) && code != SHORT_READ
     }
+
+    /// True if the file is not a session, is damaged, or was changed after it was recorded.
+    #[must_use]
+    pub fn is_damage(&self) -> bool {
+        match self {
+            Self::Sql { source, .. } => is_malformed(source),
+            Self::Damaged { .. }
+            | Self::NotASession { .. }
+            | Self::Empty { .. }
+            | Self::Changed { .. }
+            | Self::Contradictory { .. }
+            | Self::Unsound { .. } => true,
+            _ => false,
+        }
+    }
+}
+
+/// Result code of SQLite for a file that ends early.
+const SHORT_READ: i32 = 522;
+
+/// Result code of SQLite, 0 for an error that is not its own.
+fn code_of(error: &sqlx::Error) -> i32 {
+    let code = error.as_database_error().and_then(|e| e.code());
+    code.and_then(|c| c.parse().ok()).unwrap_or(0)
+}
+
+/// True if SQLite finds the file malformed, not a database, or too short.
+fn is_malformed(error: &sqlx::Error) -> bool {
+    let code = code_of(error);
+    matches!(code & 0xff, 11 | 26) || code == SHORT_READ
 }
 
 impl From<RecorderError> for Problem {

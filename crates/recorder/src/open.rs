@@ -188,7 +188,9 @@ fn check_first_page(path: &Path) -> Result<JournalMode, RecorderError> {
         };
     }
     if &page[..16] != b"SQLite format 3\0" {
-        return not("a file that is not an SQLite database");
+        return not(
+            "a file that is not an SQLite database; if it was a session, `skinrig salvage` copies its intact part",
+        );
     }
     // Before the first checkpoint of a running session, the schema is only in the log.
     let number =
