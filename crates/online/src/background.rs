@@ -76,6 +76,12 @@ impl CameraRates {
         }
     }
 
+    /// Events of a region above those that are idle in so many slots.
+    fn excess(&self, region: usize, events: u32, slots: i64) -> i128 {
+        let idle = (i128::from(self.idle[region]) * i128::from(slots)) >> BITS;
+        i128::from(events) - idle
+    }
+
     fn correct(&mut self) {
         for ((rate, counted), steps) in self
             .idle
@@ -127,6 +133,12 @@ impl Background {
         self.cameras[camera].steps[region]
     }
 
+    /// Events of a region above those that are idle in so many slots; 0 for fewer.
+    pub(crate) fn excess(&self, camera: usize, region: usize, events: u32, slots: i64) -> u32 {
+        let excess = self.cameras[camera].excess(region, events, slots);
+        excess.clamp(0, i128::from(u32::MAX)) as u32
+    }
+
     /// Starts to fade after a press of `slots` slots with these events per region.
     pub(crate) fn release(&mut self, pressed: [&[u32]; 2], slots: i64) {
         for (camera, pressed) in self.cameras.iter_mut().zip(pressed) {
@@ -135,11 +147,8 @@ impl Background {
             }
             camera.fading.clear();
             camera.seen.fill(0);
-            let of_touch = |region: usize| {
-                let idle = (i128::from(camera.idle[region]) * i128::from(slots)) >> BITS;
-                i128::from(pressed[region]) - idle
-            };
             for region in 0..REGIONS {
+                let of_touch = |region: usize| camera.excess(region, pressed[region], slots);
                 let both = of_touch(region) + of_touch(opposite(region));
                 if let Ok(both @ 1..) = u32::try_from(both) {
                     camera.fading.push(Fading {

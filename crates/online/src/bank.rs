@@ -4,10 +4,13 @@
 //! against the background; a sum never falls below 0 (Page 1954), so that each begins at the best moment. The largest one is
 //! the statistic.
 
+use std::f64::consts::LN_2;
+
 use crate::background::Background;
 use crate::log_table::{LogTable, OCTAVE, fixed, ratio, steps};
 use crate::model::TouchModel;
-use crate::regions::REGIONS;
+use crate::patterns::LEAST_SHARE;
+use crate::regions::{REGIONS, opposite};
 use crate::slots::SlotCounts;
 
 /// Largest sum, nats: it falls to 0 soon after the events of a press end.
@@ -51,6 +54,10 @@ pub(crate) struct Bank {
     sums: Vec<i64>,
     since: Vec<i64>,
     most: i64,
+    /// The smallest share that patterns keep, as steps of a ratio,
+    least: i32,
+    /// and such a step, 2^-20 nats.
+    step: i64,
 }
 
 impl Bank {
@@ -87,6 +94,8 @@ impl Bank {
             sums: vec![0; tests],
             since: vec![0; tests],
             most: fixed(MOST_NATS),
+            least: steps(LEAST_SHARE),
+            step: fixed(LN_2 / f64::from(OCTAVE)),
         }
     }
 
@@ -130,6 +139,37 @@ impl Bank {
             (best.place, best.since) = (test / self.levels.len(), self.since[test]);
         }
         best
+    }
+
+    /// Odds that these events of a touch, above the background, are those of a release rather than of a beginning touch at any place,
+    /// 2^-20 nats: with the other polarity, the best pattern holds them so much better.
+    pub(crate) fn release_odds(&mut self, excess: impl Fn(usize, usize) -> u32) -> i64 {
+        let best = |of: &mut Self, other: bool| {
+            of.gains.fill(0);
+            for camera in 0..2 {
+                for region in 0..REGIONS {
+                    let from = if other { opposite(region) } else { region };
+                    let events = i64::from(excess(camera, from));
+                    if events > 0 {
+                        of.share(camera * REGIONS + region, events);
+                    }
+                }
+            }
+            of.gains.iter().copied().max().unwrap_or(0)
+        };
+        best(self, true) - best(self, false)
+    }
+
+    /// Adds the logarithms of the shares of a region, above the smallest share that patterns keep, to the first gain of each place.
+    fn share(&mut self, region: usize, events: i64) {
+        let (from, to) = (
+            self.starts[region] as usize,
+            self.starts[region + 1] as usize,
+        );
+        for share in &self.shares[from..to] {
+            let gain = &mut self.gains[share.place as usize * self.levels.len()];
+            *gain += i64::from(share.steps - self.least) * events * self.step;
+        }
     }
 
     fn gain(&mut self, region: usize, events: u16, expected: i32) {

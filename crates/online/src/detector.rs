@@ -18,7 +18,7 @@ use crate::touch::{Phase, Touch};
 pub enum Felt {
     /// A touch began.
     Onset,
-    /// The onset was false: its evidence vanished before it was certain.
+    /// The onset was false: its evidence vanished before it was certain, or the motion was a release.
     Withdrawn,
     /// The touch ended.
     Release,
@@ -222,16 +222,34 @@ impl Core {
 
     fn touched(&mut self, slot: i64, counts: [&SlotCounts; 2], each: &mut impl FnMut(Detection)) {
         self.touch.count(counts);
-        if self.touch.phase(slot) == Phase::Over {
+        let before = self.touch.stage();
+        let phase = self.touch.phase(slot);
+        let rests = (before, phase) == (Phase::Pressing, Phase::Holding);
+        // A release that is taken for a touch would last until the next press, and hide it, and so on.
+        let was_release = rests && self.release_odds(slot) >= self.threshold;
+        if was_release || phase == Phase::Over {
+            let felt = if was_release {
+                Felt::Withdrawn
+            } else {
+                Felt::Release
+            };
             let known = self.onset.take();
             let best = known.unwrap_or(Best {
                 sum: 0,
                 place: 0,
                 since: slot,
             });
-            each(self.detection(Felt::Release, slot, best));
+            each(self.detection(felt, slot, best));
             self.release(slot);
         }
+    }
+
+    /// Odds that the motion so far was a release, 2^-20 nats.
+    fn release_odds(&mut self, slot: i64) -> i64 {
+        let (background, pressed) = (&self.background, self.touch.pressed());
+        let slots = slot - self.touch.begun() + 1;
+        let excess = |k: usize, r: usize| background.excess(k, r, pressed[k][r], slots);
+        self.bank.release_odds(excess)
     }
 
     /// Returns to an idle skin, on which the press counted so far fades.

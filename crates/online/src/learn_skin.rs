@@ -38,6 +38,7 @@ impl SkinModel {
             clocks: *training.clocks(),
             threshold: idle.threshold(false_alarms_per_s),
             settling: None,
+            longest_window_us: training.longest_window_us(&analysis.settings),
             idle_s: idle.seconds(),
             clocks_at_us: training.middle_us(),
             touches,

@@ -13,7 +13,7 @@ const EARLY_SHARE: f64 = 0.05;
 /// The common shape of all presses counts as this many events of a place.
 const SHAPE_EVENTS: f64 = 60.0;
 /// Smaller shares of a region are left out.
-const LEAST_SHARE: f64 = 3e-4;
+pub(crate) const LEAST_SHARE: f64 = 3e-4;
 /// Width of a region, px.
 const REGION_PX: f64 = skinrig_model::SENSOR_WIDTH as f64 / COLUMNS as f64;
 

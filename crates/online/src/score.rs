@@ -70,7 +70,7 @@ pub struct DetectionScore {
     pub missed: usize,
     /// Presses that came while a false alarm lasted: neither felt nor missed.
     pub alarmed: usize,
-    /// Onsets between presses, until 1 ms before the contact.
+    /// Onsets between presses, until 1 ms before the contact, and touches that last from one press to the next.
     pub false_alarms: u64,
     /// Time in which an onset is a false alarm, s.
     pub at_risk_s: f64,
@@ -99,6 +99,8 @@ impl DetectionScore {
         self.at_risk_s += (press.contact_from_us() - press.free_from_us).max(0.0) * 1e-6;
         if begin > 0 && found[begin - 1].felt == Felt::Onset {
             self.alarmed += 1;
+            // A touch since the press before: it lasts over all the time in which none may.
+            self.false_alarms += u64::from(begin == free);
             return;
         }
         let during = &found[begin..before(press.release_us).max(begin)];
@@ -183,5 +185,21 @@ mod tests {
         assert_eq!(score.releases_ms.len(), 2);
         let (rate, (low, high)) = score.false_alarms_per_s().unwrap();
         assert!(low < rate && rate < high && (rate - 2.0 / 7.996).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_touch_from_one_press_to_the_next_is_a_false_alarm() {
+        let press = ScoredPress {
+            row: 0,
+            contact_us: 10e6,
+            release_us: 10.4e6,
+            free_from_us: 8e6,
+        };
+        let found = [
+            found(Felt::Onset, 7_990_000),
+            found(Felt::Release, 10_100_000),
+        ];
+        let score = DetectionScore::new(&found, &[press]);
+        assert_eq!((score.false_alarms, score.alarmed, score.missed), (1, 1, 0));
     }
 }

@@ -25,6 +25,8 @@ pub struct SkinModel {
     pub(crate) threshold: f64,
     /// How far positions still move; `None` if the presses are too few for regions.
     pub(crate) settling: Option<Settling>,
+    /// The longest window of a press, µs: later events of a touch do not count for its position, they would add only noise.
+    pub(crate) longest_window_us: Option<i64>,
     /// Idle time behind the threshold, s.
     pub(crate) idle_s: f64,
     /// Middle of the presses behind the clock fits, host µs.
@@ -51,6 +53,7 @@ impl SkinModel {
         };
         Self {
             clocks: self.clocks.map(faster),
+            longest_window_us: self.longest_window_us.map(|us| (us as f64 / factor) as i64),
             touches: self.touches.thinned(factor),
             ..self.clone()
         }
@@ -121,6 +124,7 @@ impl SkinModel {
             touches,
             threshold,
             settling: None,
+            longest_window_us: None,
             idle_s: 10.0,
             clocks_at_us: 0.0,
         }

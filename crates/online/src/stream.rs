@@ -71,6 +71,7 @@ pub(crate) struct TouchStream {
     /// and time before which it has sent everything, camera µs.
     newest_us: [u64; 2],
     before_us: i64,
+    longest_window_us: Option<i64>,
     every_us: i64,
     touch: Option<OpenTouch>,
     /// Host time since which no touch is felt, µs.
@@ -82,6 +83,8 @@ pub(crate) struct TouchStream {
 #[derive(Debug, Clone, Copy)]
 struct OpenTouch {
     next_us: i64,
+    /// End of its window.
+    end_us: i64,
 }
 
 impl TouchStream {
@@ -98,6 +101,7 @@ impl TouchStream {
             waiting: Default::default(),
             newest_us: [0; 2],
             before_us: (skin.settings.window_before_ms * 1e3) as i64,
+            longest_window_us: skin.longest_window_us,
             every_us: every_us.max(1),
             touch: None,
             idle_since_us: from_us,
@@ -184,6 +188,9 @@ impl TouchStream {
                     self.open(decision.since_us - self.before_us);
                     self.touch = Some(OpenTouch {
                         next_us: decision.host_us,
+                        end_us: self
+                            .longest_window_us
+                            .map_or(i64::MAX, |us| decision.since_us.saturating_add(us)),
                     });
                 }
                 Felt::Withdrawn | Felt::Release => {
@@ -216,10 +223,10 @@ impl TouchStream {
     fn positions_until(&mut self, host_us: i64, each: &mut impl FnMut(Estimate)) {
         while let Some(touch) = self.touch.filter(|t| t.next_us <= host_us) {
             let host_us = touch.next_us;
-            let position = self.position(host_us);
+            let position = self.position(host_us.min(touch.end_us));
             each(Estimate::Position { host_us, position });
             let next_us = host_us + self.every_us;
-            self.touch = Some(OpenTouch { next_us });
+            self.touch = Some(OpenTouch { next_us, ..touch });
         }
     }
 

@@ -229,20 +229,15 @@ proptest! {
     }
 }
 
-/// Everything felt in two streams that come whole, one camera after the other, or in slices in turn.
-fn felt(streams: &[Vec<CdEvent>; 2], slice: usize) -> Vec<(Felt, i64)> {
-    let skin = SkinModel::nominal(model(), clocks(), 14.0);
+/// Every estimate from two streams that come whole, one camera after the other, or in slices in turn.
+fn estimates(skin: &SkinModel, streams: &[Vec<CdEvent>; 2], slice: usize) -> Vec<Estimate> {
     let settings = StreamSettings {
         every_us: 5_000,
         from_us: 0,
     };
-    let mut stream = TouchStream::new(&skin, settings).unwrap();
+    let mut stream = TouchStream::new(skin, settings).unwrap();
     let mut found = Vec::new();
-    let mut each = |e: Estimate| {
-        if let Estimate::Felt(d) = e {
-            found.push((d.felt, d.host_us));
-        }
-    };
+    let mut each = |e: Estimate| found.push(e);
     let mut slices = [0, 1].map(|k| streams[k].chunks(slice));
     loop {
         let next = [slices[0].next(), slices[1].next()];
@@ -257,6 +252,54 @@ fn felt(streams: &[Vec<CdEvent>; 2], slice: usize) -> Vec<(Felt, i64)> {
     }
     stream.finish(&mut each);
     found
+}
+
+/// Everything felt.
+fn felt(streams: &[Vec<CdEvent>; 2], slice: usize) -> Vec<(Felt, i64)> {
+    all_felt(&SkinModel::nominal(model(), clocks(), 14.0), streams, slice)
+}
+
+fn all_felt(skin: &SkinModel, streams: &[Vec<CdEvent>; 2], slice: usize) -> Vec<(Felt, i64)> {
+    let felt = |e| match e {
+        Estimate::Felt(d) => Some((d.felt, d.host_us)),
+        Estimate::Position { .. } => None,
+    };
+    let all = estimates(skin, streams, slice).into_iter();
+    all.filter_map(felt).collect()
+}
+
+#[test]
+fn events_after_the_longest_window_do_not_count_for_the_position() {
+    let streams = streams(7, Some(2));
+    let events_at = |longest_window_us: Option<i64>| -> Vec<(i64, [u32; 2])> {
+        let skin = SkinModel {
+            longest_window_us,
+            ..SkinModel::nominal(model(), clocks(), 14.0)
+        };
+        let events = |e| match e {
+            Estimate::Position { host_us, position } => Some((host_us, position.events)),
+            Estimate::Felt(_) => None,
+        };
+        let all = estimates(&skin, &streams, 100).into_iter();
+        all.filter_map(events).collect()
+    };
+    let (whole, cut) = (events_at(None), events_at(Some(50_000)));
+    assert_eq!(whole.len(), cut.len());
+    let onset_us = whole[0].0;
+    let (early, late): (Vec<_>, Vec<_>) = whole
+        .iter()
+        .zip(&cut)
+        .partition(|((t, _), _)| *t <= onset_us + 40_000);
+    assert!(early.len() > 5 && early.iter().all(|(whole, cut)| whole == cut));
+    let [last_whole, last_cut] = [whole[whole.len() - 1].1, cut[cut.len() - 1].1];
+    assert!(
+        (0..2).all(|k| last_whole[k] > last_cut[k]),
+        "{last_whole:?} {last_cut:?}"
+    );
+    // All instants after the window hold the same events.
+    let after = late.iter().filter(|((t, _), _)| *t > onset_us + 60_000);
+    assert!(after.clone().count() > 20);
+    assert!(after.map(|(_, cut)| cut.1).all(|events| events == last_cut));
 }
 
 #[test]
@@ -281,10 +324,9 @@ fn a_gap_in_both_streams_and_a_camera_far_ahead_change_nothing() {
     }
 }
 
-/// A touch taken up at a release, as when one begins to feel in the middle of a press, does not hide those that follow.
-#[test]
-fn a_touch_that_began_at_a_release_ends_before_the_next_press() {
-    let streams = CameraId::ALL.map(|camera| {
+/// Three touches, of which the first one is seen only from its release on.
+fn begun_in_the_middle_of_a_press() -> [Vec<CdEvent>; 2] {
+    CameraId::ALL.map(|camera| {
         let k = camera.index();
         let clock = clocks()[k];
         let touches = [
@@ -304,8 +346,10 @@ fn a_touch_that_began_at_a_release_ends_before_the_next_press() {
         all.retain(|e| !(0.9e6..1.29e6).contains(&clock.host_us_of_camera(e.t_us as f64)));
         all.sort_by_key(|e| e.t_us);
         all
-    });
-    let found = felt(&streams, 500);
+    })
+}
+
+fn assert_later_touches_are_felt(found: &[(Felt, i64)]) {
     for contact_us in [3_000_000, 5_000_000] {
         let onset = (Felt::Onset, contact_us..contact_us + 5_000);
         let is_felt = found
@@ -313,4 +357,38 @@ fn a_touch_that_began_at_a_release_ends_before_the_next_press() {
             .any(|(felt, at)| *felt == onset.0 && onset.1.contains(at));
         assert!(is_felt, "{contact_us}: {found:?}");
     }
+}
+
+/// A touch taken up at a release, as when one begins to feel in the middle of a press, does not hide those that follow.
+#[test]
+fn a_touch_that_began_at_a_release_ends_before_the_next_press() {
+    assert_later_touches_are_felt(&felt(&begun_in_the_middle_of_a_press(), 500));
+}
+
+/// Nor does one on a skin whose presses may last longer than the time between two: at a release, pixels change the other way.
+#[test]
+fn a_release_is_told_from_a_long_touch_by_its_polarity() {
+    let mut skin = SkinModel::nominal(model(), clocks(), 14.0);
+    skin.touches.longest_press = 8_000;
+    for pattern in &mut skin.touches.patterns {
+        for (_, region, share) in &mut pattern.shares {
+            *share *= if *region & 1 == 1 { 1.6 } else { 0.4 };
+        }
+    }
+    let mut streams = begun_in_the_middle_of_a_press();
+    for camera in CameraId::ALL {
+        let clock = clocks()[camera.index()];
+        for (n, e) in streams[camera.index()].iter_mut().enumerate() {
+            let at_us = clock.host_us_of_camera(e.t_us as f64) % 2e6;
+            let usual = !n.is_multiple_of(5);
+            if (1.0e6..1.1e6).contains(&at_us) {
+                e.polarity = Polarity::from_bit(usual);
+            } else if (1.3e6..1.4e6).contains(&at_us) {
+                e.polarity = Polarity::from_bit(!usual);
+            }
+        }
+    }
+    let found = all_felt(&skin, &streams, 500);
+    assert_eq!(found[1].0, Felt::Withdrawn, "{found:?}");
+    assert_later_touches_are_felt(&found);
 }

@@ -94,6 +94,11 @@ impl Touch {
         [&self.pressed[0], &self.pressed[1]]
     }
 
+    /// Where the touch stood after the slot before.
+    pub(crate) const fn stage(&self) -> Phase {
+        self.phase
+    }
+
     /// Where the touch stands after this slot.
     pub(crate) fn phase(&mut self, slot: i64) -> Phase {
         let moving = self.sum.saturating_sub(self.idle);

@@ -2,7 +2,7 @@
 
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{ClockFit, PressResult};
-use skinrig_model::{CameraId, PressRole, Verdict};
+use skinrig_model::{AnalysisSettings, CameraId, PressRole, Verdict, WindowAnchor};
 
 /// A press without a camera clock or without enough calibration presses to learn from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -114,6 +114,13 @@ impl Training {
         0.5 * (first + self.end_us())
     }
 
+    /// The longest window of a press, µs; `None` if windows lie about the middle of the presses.
+    pub(crate) fn longest_window_us(&self, settings: &AnalysisSettings) -> Option<i64> {
+        let each = self.presses.iter().map(|p| p.window_us(settings));
+        let longest = each.max_by(f64::total_cmp)?;
+        (settings.window_anchor == WindowAnchor::Touch).then_some(longest as i64)
+    }
+
     /// End of the last press, host µs.
     #[must_use]
     pub fn end_us(&self) -> f64 {
@@ -126,6 +133,16 @@ impl Training {
 pub(crate) const MARGIN_US: f64 = 20e3;
 
 impl TrainingPress {
+    /// Length of its window after the contact, µs: to the release, or as far as the settings let it reach.
+    fn window_us(&self, settings: &AnalysisSettings) -> f64 {
+        let after_contact = settings.window_after_contact_ms;
+        let after_contact_us = after_contact.map_or(f64::INFINITY, |ms| ms * 1e3);
+        let after_depth_us = settings.window_after_depth_ms * 1e3;
+        (self.release_us - self.contact_us + settings.window_after_ms * 1e3)
+            .min(self.at_depth_us - self.contact_us + after_depth_us)
+            .min(after_contact_us)
+    }
+
     /// Time between this press and the next, host µs; `None` if the next one is unknown.
     pub(crate) fn gap_us(&self) -> Option<(f64, f64)> {
         let gap = (
