@@ -85,7 +85,9 @@ const fn source_of(violation: &AlignmentViolation, both: bool) -> (EvidenceKind,
 const fn evidence_of(fault: Fault, camera: &'static str) -> (EvidenceKind, &'static str) {
     match fault {
         Fault::CameraBlind | Fault::NoEvents => (EvidenceKind::DeviceLost, camera),
-        Fault::RecordingShort | Fault::RecordingGap => (EvidenceKind::DataLost, camera),
+        Fault::RecordingShort | Fault::RecordingGap | Fault::EventsOutOfOrder => {
+            (EvidenceKind::DataLost, camera)
+        }
         Fault::CamerasSwapped
         | Fault::OneCameraTwice
         | Fault::PictureTurned

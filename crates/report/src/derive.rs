@@ -195,7 +195,7 @@ pub(crate) fn rmse_elsewhere(analysis: &Analysis) -> Option<String> {
     let rmse = analysis.left_out_rmse()?;
     let (value, interval) = (number(rmse.value, 2), interval(rmse, 1.0, 2));
     Some(format!(
-        "{value} mm {interval} where no press calibrated, n {} locations",
+        "{value} mm {interval} where no press calibrated, n {} presses",
         rmse.n
     ))
 }

@@ -558,4 +558,6 @@ fn a_stream_out_of_order_is_named() {
         "{:?}",
         analysis.warnings
     );
+    assert_eq!(named(&analysis.findings), [Fault::EventsOutOfOrder; 2]);
+    assert!(analysis.findings.iter().all(|f| f.invalidates));
 }

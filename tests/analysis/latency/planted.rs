@@ -70,9 +70,12 @@ fn planted_latencies_come_back_with_their_uncertainty() {
         let v = e.value.unwrap();
         (v - ms).abs() <= 2.0 && e.low.unwrap() <= v && v <= e.high.unwrap() && e.n == 25
     };
-    assert!(
-        close(contact.p5_ms, 11.2) && close(contact.median_ms, 22.0) && close(contact.p95_ms, 32.8)
-    );
+    assert!(close(contact.median_ms, 22.0));
+    // Of 25 onsets the outermost may all lie within the outer percentiles.
+    for (outer, ms) in [(contact.p5_ms, 11.2), (contact.p95_ms, 32.8)] {
+        assert!((outer.value.unwrap() - ms).abs() <= 2.0);
+        assert_eq!((outer.low, outer.high, outer.n), (None, None, 25));
+    }
     assert!((found.width_ms.value.unwrap() - 21.6).abs() < 1.0);
     assert_eq!((contact.before_contact, contact.missed), (0, 0));
     assert_counts_are_listed(&found);

@@ -13,4 +13,5 @@ mod online;
 mod overflow;
 mod paper_scene;
 mod retakes;
+mod session_intervals;
 mod unusual;

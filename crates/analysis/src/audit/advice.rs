@@ -51,6 +51,10 @@ pub(super) const fn of(fault: Fault) -> &'static str {
         Fault::NoEvents => {
             "check that the camera was connected and running, and that the right stream was read"
         }
+        Fault::EventsOutOfOrder => {
+            "read the recording with `skinrig inspect`; blocks of the file were exchanged, or written by several threads: copy it from the \
+             camera's computer again"
+        }
         Fault::NoTriggers => "check the cable, the channel and the level of the trigger line",
         Fault::NoTruth => "check the pose stream of the robot, or the position table of the import",
         Fault::PressesMissing => {

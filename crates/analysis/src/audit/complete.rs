@@ -7,12 +7,16 @@ use skinrig_model::{CameraId, PressRole, PressVerdict};
 use super::finding::finding;
 use super::observed_press::is_number;
 use crate::input::SessionInput;
-use crate::result::{Analysis, ClockMethod, Evidence, Fault, Finding, Law, SeenMarks};
+use crate::result::{
+    Analysis, ClockMethod, Evidence, Fault, Finding, Law, SeenMarks, WarningCause,
+};
 
 /// Largest share of planned but never attempted presses in a complete session.
 const MAX_MISSED: f64 = 0.1;
 /// Largest share of attempted presses without a measured time or position.
 const MAX_WITHOUT_TRUTH: f64 = 0.2;
+/// Largest share of events that come after later ones; a camera sends none.
+const MAX_LATE: f64 = 0.01;
 /// Smallest share of sent marks that a clock fit can use if the trigger line works.
 const MIN_MARKS: f64 = 0.5;
 
@@ -20,6 +24,11 @@ pub(super) fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding
     let mut found = Vec::new();
     found.extend(contradiction(input));
     found.extend(events(analysis));
+    found.extend(
+        CameraId::ALL
+            .into_iter()
+            .filter_map(|camera| disorder(analysis, camera)),
+    );
     found.extend(truth(input));
     found.extend(missed(input));
     found.extend(triggers(input, analysis));
@@ -99,6 +108,30 @@ fn events(analysis: &Analysis) -> Vec<Finding> {
         }
     });
     named.collect()
+}
+
+/// Events that came too late for their windows.
+fn disorder(analysis: &Analysis, camera: CameraId) -> Option<Finding> {
+    let own = analysis
+        .warnings
+        .iter()
+        .filter(|w| w.camera == Some(camera));
+    let (late, limit_ms) = own.into_iter().find_map(|w| match w.cause {
+        WarningCause::EventsOutOfOrder { events, limit_ms } => Some((events, limit_ms)),
+        _ => None,
+    })?;
+    let activity = analysis.activity.iter().find(|a| a.camera == camera)?;
+    let events: u64 = activity.counts.iter().sum();
+    (late as f64 > MAX_LATE * events as f64).then(|| {
+        let evidence = Evidence::EventsOutOfOrder {
+            camera,
+            late,
+            events,
+            limit_ms,
+        };
+        let fault = Fault::EventsOutOfOrder;
+        finding(Law::Complete, fault, Some(camera), evidence)
+    })
 }
 
 fn truth(input: &SessionInput) -> Option<Finding> {

@@ -26,9 +26,9 @@ fn place(finding: &Finding) -> u8 {
         Fault::ClockWrong if is_seen_in_bursts(finding) => 5,
         Fault::JournalContradictory => 0,
         Fault::NoEvents => 1,
-        Fault::RecordingShort => 2,
-        Fault::RecordingGap => 3,
-        Fault::NoTruth => 4,
+        Fault::EventsOutOfOrder => 2,
+        Fault::RecordingShort => 3,
+        Fault::RecordingGap | Fault::NoTruth => 4,
         Fault::PressesMissing => 6,
         Fault::OneCameraTwice => 7,
         Fault::UnitOfPositions => 8,
@@ -75,6 +75,15 @@ fn explains(a: &Finding, b: &Finding) -> bool {
             Fault::NotTouched | Fault::Unknown | Fault::RigMoved => true,
             _ => false,
         },
+        // Windows miss events of their presses, and hold those of others.
+        Fault::EventsOutOfOrder => !matches!(
+            b.fault,
+            Fault::EventsOutOfOrder
+                | Fault::JournalContradictory
+                | Fault::NoTruth
+                | Fault::PressesMissing
+                | Fault::NoTriggers
+        ),
         Fault::NoTruth => matches!(
             b.fault,
             Fault::RobotOff | Fault::Unknown | Fault::UnitOfPositions

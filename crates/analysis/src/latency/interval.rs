@@ -1,21 +1,23 @@
-//! Estimates of a detector at one threshold, with expanded percentile intervals (Hesterberg 2015) over locations; exact
-//! intervals for false alarms, and where nothing or everything was detected.
+//! Estimates of a detector at one threshold, with intervals over locations: ranks for percentiles of the onsets, expanded percentiles
+//! of a bootstrap (Hesterberg 2015) for their width and the detected share; exact ones for false alarms, and where nothing or
+//! everything was detected.
 
 use rayon::prelude::*;
 
 use super::sweep::OnsetStatistics;
 use crate::exact;
 use crate::metrics::quantile;
+use crate::over_locations::Draws;
 use crate::result::Estimate;
 use skinrig_statistics::distributions::{normal_cdf, student_quantile};
-use skinrig_statistics::seeded;
+use skinrig_statistics::{Sample, SampleFault, seeded};
 
 /// Probability outside a 95 % interval on each side.
 const TAIL: f64 = 0.025;
 
 /// Number of quantities with an interval, in the order of [`Figures`].
-const COUNT: usize = 6;
-/// (value, n) of each: detected share, width, median; 5th percentile, median and 95th percentile after contact.
+const COUNT: usize = 2;
+/// (value, n) of each: detected share, width.
 type Figures = [(Option<f64>, u32); COUNT];
 const DETECTED: usize = 0;
 
@@ -95,32 +97,52 @@ impl Plan {
                 n,
             }
         };
+        let median_ms = self.percentile(outcomes, 0.5, false, |all| {
+            Sample::median(all.iter().map(|(at, ms)| (*at, Some(*ms))))
+        });
+        let outer = |q: f64, low: bool| {
+            self.percentile(outcomes, q, low, |all| {
+                Sample::percentile_95(all.iter().copied())
+            })
+        };
         Estimates {
             detected_rate: estimate(DETECTED),
             width_ms: estimate(1),
-            median_ms: estimate(2),
+            median_ms,
             false_alarms_per_s: false_alarms_per_s(outcomes),
-            from_contact_ms: [estimate(3), estimate(4), estimate(5)],
+            from_contact_ms: [outer(0.05, true), median_ms, outer(0.95, false)],
         }
+    }
+
+    /// A percentile of all onsets with its interval by ranks; of the onsets with the other sign if `low`. Where an end lies beyond
+    /// all onsets there is no interval.
+    fn percentile(
+        &self,
+        outcomes: &[Outcome],
+        q: f64,
+        low: bool,
+        sample: impl Fn(&[(u32, f64)]) -> Result<Sample, SampleFault>,
+    ) -> Estimate {
+        let sign = if low { -1.0 } else { 1.0 };
+        let onset = |o: &Outcome| Some((o.location, sign * o.onset_ms?));
+        let onsets: Vec<(u32, f64)> = outcomes.iter().filter_map(onset).collect();
+        let draws = Draws {
+            resamples: self.resamples,
+            seed: self.seed,
+        };
+        let ends = draws.ends(sample(&onsets));
+        let ends = ends.map(|(a, b)| if low { (-b, -a) } else { (a, b) });
+        let mut values: Vec<f64> = onsets.iter().map(|o| sign * o.1).collect();
+        Estimate::new(quantile(&mut values, q), ends, onsets.len())
     }
 
     fn figures(&self, places: &[&[Outcome]]) -> Figures {
         let all = || places.iter().flat_map(|p| p.iter());
         let trials = all().count() as u32;
         let onsets: Vec<f64> = all().filter_map(|o| o.onset_ms).collect();
-        let mut late: Vec<f64> = onsets.clone();
         let hits = OnsetStatistics::of(onsets, self.window_ms);
         let share = (trials > 0).then(|| f64::from(hits.count) / f64::from(trials));
-        let n = late.len() as u32;
-        let mut after = |q| (quantile(&mut late, q), n);
-        [
-            (share, trials),
-            (hits.width_ms, hits.count),
-            (hits.median_ms, hits.onsets),
-            after(0.05),
-            after(0.5),
-            after(0.95),
-        ]
+        [(share, trials), (hits.width_ms, hits.count)]
     }
 }
 

@@ -59,6 +59,8 @@ pub enum Fault {
     RecordingGap,
     /// A camera sent no events.
     NoEvents,
+    /// The events of a camera are not in the order of their times.
+    EventsOutOfOrder,
     /// No trigger edges although the rig has a trigger line.
     NoTriggers,
     /// No measured positions, or no measured times.
@@ -103,6 +105,7 @@ impl Fault {
             Self::RecordingShort => "recording short",
             Self::RecordingGap => "recording gap",
             Self::NoEvents => "no events",
+            Self::EventsOutOfOrder => "events out of order",
             Self::NoTriggers => "no triggers",
             Self::NoTruth => "no truth",
             Self::PressesMissing => "presses missing",
@@ -136,7 +139,8 @@ impl Fault {
     /// True if the errors of the session do not describe the skin. Missing or displaced data leave the rest usable.
     #[must_use]
     pub const fn invalidates(self) -> bool {
-        self.is_mistaken_identity() || matches!(self, Self::JournalContradictory)
+        self.is_mistaken_identity()
+            || matches!(self, Self::JournalContradictory | Self::EventsOutOfOrder)
     }
 }
 

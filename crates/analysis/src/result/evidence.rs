@@ -1,11 +1,12 @@
 //! Owns the evidence of an audit finding: what was expected and what was found, with numbers and n.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CameraId, InvalidReason, PressId, RepetitionId};
 
-use super::evidence_parts::{FittingPlan, OnsetHeight, PeakForce, Response, SeenMarks, Silence};
+use super::evidence_parts::{
+    FittingPlan, OnsetHeight, PeakForce, Response, SeenMarks, Silence, in_degrees, joined, noise,
+    times,
+};
 use super::other_reading::OtherReading;
 use crate::with_text::with_text;
 
@@ -527,6 +528,20 @@ pub enum Evidence {
         /// Presses that share a position.
         presses: usize,
     },
+    /// Events that come after later ones.
+    #[error(
+        "expected the events of {camera} in the order of their times, found {late} of {events} more than {limit_ms} ms late"
+    )]
+    EventsOutOfOrder {
+        /// The camera.
+        camera: CameraId,
+        /// Late events.
+        late: u64,
+        /// All events.
+        events: u64,
+        /// How late, ms.
+        limit_ms: u64,
+    },
     /// A camera's clock could not be aligned.
     #[error(
         "expected {presses} presses to show in the events of {camera}, found no alignment of the clocks in which they do"
@@ -571,25 +586,3 @@ pub enum Evidence {
 }
 
 with_text!(Evidence);
-
-fn joined<T: fmt::Display>(items: &[T], by: &str) -> String {
-    let texts: Vec<String> = items.iter().map(T::to_string).collect();
-    texts.join(by)
-}
-
-fn times(all_s: &[f64]) -> String {
-    let texts: Vec<String> = all_s.iter().map(|at| format!("{at:+.1}")).collect();
-    texts.join(", ")
-}
-
-fn noise(per_s: Option<[f64; 2]>) -> String {
-    per_s.map_or_else(String::new, |[one, two]| {
-        format!("; both cameras send noise ({one:.0} and {two:.0} events/s)")
-    })
-}
-
-fn in_degrees(off_deg: &[Option<f64>; 2]) -> String {
-    let [one, two] =
-        off_deg.map(|off| off.map_or_else(|| "-".to_owned(), |off| format!("{off:.1}")));
-    format!("{one} and {two} degrees (cameras 1 and 2)")
-}

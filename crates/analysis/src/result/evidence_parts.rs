@@ -96,3 +96,25 @@ pub struct PeakForce {
     /// Presses.
     pub presses: usize,
 }
+
+pub(super) fn joined<T: fmt::Display>(items: &[T], by: &str) -> String {
+    let texts: Vec<String> = items.iter().map(T::to_string).collect();
+    texts.join(by)
+}
+
+pub(super) fn times(all_s: &[f64]) -> String {
+    let texts: Vec<String> = all_s.iter().map(|at| format!("{at:+.1}")).collect();
+    texts.join(", ")
+}
+
+pub(super) fn noise(per_s: Option<[f64; 2]>) -> String {
+    per_s.map_or_else(String::new, |[one, two]| {
+        format!("; both cameras send noise ({one:.0} and {two:.0} events/s)")
+    })
+}
+
+pub(super) fn in_degrees(off_deg: &[Option<f64>; 2]) -> String {
+    let [one, two] =
+        off_deg.map(|off| off.map_or_else(|| "-".to_owned(), |off| format!("{off:.1}")));
+    format!("{one} and {two} degrees (cameras 1 and 2)")
+}

@@ -69,6 +69,10 @@ fn of_journal_and_streams() -> Vec<(Value, &'static str)> {
              presses are not recorded",
         ),
         (
+            json!({"kind": "events_out_of_order", "camera": "camera1", "late": 300, "events": 700, "limit_ms": 10}),
+            "expected the events of camera 1 in the order of their times, found 300 of 700 more than 10 ms late",
+        ),
+        (
             json!({"kind": "no_alignment", "presses": 20, "camera": "camera2"}),
             "expected 20 presses to show in the events of camera 2, found no alignment of the clocks in which they do",
         ),

@@ -45,10 +45,13 @@ pub(super) fn parameters(a: &Analysis) -> Group {
         Column::new("95 % interval").class("num nowrap"),
     ];
     let caption = "Fitted parameters before and after";
+    let scope = "Standard errors and intervals are of random error alone. What the skin does to every press alike, and what \
+        the model leaves out, is not in them, and is often larger.";
     card.download("calibration", "calibration", "the calibration")
         .with(paragraph(about))
         .with_all(origin.map(soft))
         .with(Table::of("parameters", caption, columns).with(rows))
+        .with(soft(scope))
 }
 
 /// The compared models.
