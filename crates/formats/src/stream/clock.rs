@@ -13,12 +13,23 @@ pub(super) enum Step {
     Jump(Discontinuity),
 }
 
+/// State before a word that may be damaged.
+#[derive(Debug, Clone, Copy)]
+struct Doubtful {
+    high: u32,
+    epoch_us: u64,
+    /// Value of the word.
+    found: u32,
+}
+
 /// A counter of `BITS` bits whose unit is `2^SHIFT` µs, unwrapped.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct TimeBase<const BITS: u32, const SHIFT: u32> {
     high: u32,
     epoch_us: u64,
     known: bool,
+    /// Before the last word, if that was no progress; and its value.
+    doubtful: Option<Doubtful>,
     /// Words were lost: the counter continues, but its value is unknown until the next time base word.
     stale: bool,
 }
@@ -34,6 +45,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
             high: 0,
             epoch_us: origin_us,
             known: false,
+            doubtful: None,
             stale: false,
         }
     }
@@ -68,6 +80,10 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
         self.high = high;
     }
 
+    const fn is_progress(from: u32, to: u32) -> bool {
+        to >= from && to - from <= Self::HALF
+    }
+
     /// Processes the next counter value (below `2^BITS`).
     pub(super) fn set(&mut self, high: u32) -> Step {
         let from_us = self.base_us();
@@ -78,8 +94,24 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
             self.known = true;
             return Step::Forward;
         }
-        if high >= previous && high - previous <= Self::HALF {
+        if Self::is_progress(previous, high) {
             return Step::Forward;
+        }
+        let before = Doubtful {
+            high: previous,
+            epoch_us: self.epoch_us,
+            found: high,
+        };
+        // The counter goes on where it was before the last word: that one was damaged, and no range was completed.
+        if let Some(last) = self.doubtful.replace(before)
+            && last.found == previous
+            && Self::is_progress(last.high, high)
+        {
+            (self.epoch_us, self.doubtful) = (last.epoch_us, None);
+            return Step::Jump(Discontinuity {
+                from_us,
+                to_us: self.base_us(),
+            });
         }
         if high < previous && previous - high > Self::HALF {
             self.epoch_us = self.epoch_us.wrapping_add(Self::RANGE_US);
@@ -117,5 +149,17 @@ mod tests {
         );
         assert!(matches!(base.set(2049), Step::Jump(_)));
         assert_eq!(base.set(0), Step::Wrap);
+    }
+
+    #[test]
+    fn a_damaged_word_does_not_move_the_rest() {
+        for damaged in [3, 900, 2000, 3500] {
+            let mut base = TimeBase::<12, 12>::default();
+            for high in [2900, 2901, damaged, 2902, 2903, 4095] {
+                base.set(high);
+            }
+            assert_eq!(base.base_us(), 4095 << 12, "{damaged}");
+            assert_eq!(base.set(0), Step::Wrap);
+        }
     }
 }
