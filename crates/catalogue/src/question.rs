@@ -39,6 +39,8 @@ pub enum ParameterKind {
     Count,
     /// A day, `2026-11-20`, from its beginning in UTC.
     Day,
+    /// A day, `2026-11-20`, to its end in UTC.
+    LastDay,
     /// One of these words.
     Choice(&'static [&'static str]),
 }
@@ -56,6 +58,15 @@ pub struct Answer {
     pub rows: Vec<Vec<Value>>,
 }
 
+/// Length of a day, s.
+const DAY_S: i64 = 86_400;
+
+/// Beginning of a day in UTC, s; `None` if the text is none.
+fn day_s(text: &str) -> Option<i64> {
+    let day = NaiveDate::parse_from_str(text, "%Y-%m-%d").ok()?;
+    Some(day.and_hms_opt(0, 0, 0)?.and_utc().timestamp())
+}
+
 impl ParameterKind {
     /// Description of a valid value.
     #[must_use]
@@ -63,7 +74,7 @@ impl ParameterKind {
         match self {
             Self::Text => "text".to_owned(),
             Self::Count => "a count from 1".to_owned(),
-            Self::Day => "a day, for example 2026-11-20".to_owned(),
+            Self::Day | Self::LastDay => "a day, for example 2026-11-20".to_owned(),
             Self::Choice(words) => format!("one of {}", words.join(", ")),
         }
     }
@@ -77,10 +88,8 @@ impl ParameterKind {
                 .ok()
                 .filter(|n| *n >= 1)
                 .map(Bound::from),
-            Self::Day => {
-                let day = NaiveDate::parse_from_str(text, "%Y-%m-%d").ok()?;
-                Some(day.and_hms_opt(0, 0, 0)?.and_utc().timestamp().into())
-            }
+            Self::Day => day_s(text).map(Bound::from),
+            Self::LastDay => Some((day_s(text)? + DAY_S).into()),
         }
     }
 }
@@ -124,10 +133,10 @@ impl Question {
             .collect::<Result<_, _>>()?;
         let day = |wanted: &str| bound.iter().find(|(name, ..)| *name == wanted);
         if let (Some((_, since, from)), Some((_, until, to))) = (day("since"), day("until"))
-            && from.integer() > to.integer()
+            && from.integer() >= to.integer()
         {
             return Err(wrong(
-                "since before until".to_owned(),
+                "since no later than until".to_owned(),
                 format!("{since} and {until}"),
             ));
         }

@@ -38,7 +38,7 @@ const RELATION: Parameter = optional(
     "repaired",
 );
 const SINCE: Parameter = optional("since", ParameterKind::Day, "1970-01-01");
-const UNTIL: Parameter = optional("until", ParameterKind::Day, "9999-12-31");
+const UNTIL: Parameter = optional("until", ParameterKind::LastDay, "9999-12-31");
 const LIMIT: Parameter = optional("limit", ParameterKind::Count, "50");
 
 /// A question whose statement is in `questions/`.

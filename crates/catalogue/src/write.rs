@@ -27,10 +27,11 @@ struct KnownFile {
 }
 
 impl FileEntry {
-    /// Order in which copies of a session are its source: sealed before unsealed (`skinrig salvage` never seals), then the shorter
-    /// name.
-    fn rank(&self) -> (bool, usize, &str, &str) {
-        (!self.is_sealed, self.name.len(), &self.name, &self.store)
+    /// Order in which copies of a session are its source: sealed before unsealed (`skinrig salvage` never seals), with results before
+    /// without, then the shorter name.
+    fn rank(&self, has_results: bool) -> (bool, bool, usize, &str, &str) {
+        let (name, store) = (self.name.as_str(), self.store.as_str());
+        (!self.is_sealed, !has_results, name.len(), name, store)
     }
 }
 
@@ -59,7 +60,10 @@ pub(crate) async fn session(
         db.execute(sql, &place).await?;
     }
     let is_known = !copies.is_empty() || here.iter().any(|k| k.session_id == id);
-    let is_better = |k: &KnownFile| k.file.rank() < file.rank();
+    let own = file.rank(!entry.analyses.is_empty());
+    // Of the other copies, only the source was read.
+    let source_has_results = has_results(db, id).await?;
+    let is_better = |k: &KnownFile| k.file.rank(k.is_source && source_has_results) < own;
     if copies.iter().any(|k| k.is_source && is_better(k)) {
         let sql = "DELETE FROM session_file WHERE session_id = $1 AND store = $2 AND name = $3";
         let place = [
@@ -83,6 +87,13 @@ pub(crate) async fn session(
     insert_file(db, id, file, true).await?;
     details(db, entry).await?;
     Ok(true)
+}
+
+/// True if analyses of this session are known.
+async fn has_results(db: &mut Db, id: &str) -> Result<bool, sqlx::Error> {
+    let sql = "SELECT 1 FROM analysis WHERE session_id = $1 LIMIT 1";
+    let found = db.fetch(sql, &[id.into()]).await?;
+    Ok(!found.rows.is_empty())
 }
 
 /// Forgets a file. Copies of its session, if it was the source, are forgotten too, and read again.

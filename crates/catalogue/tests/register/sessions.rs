@@ -363,6 +363,27 @@ fn copies_of_a_session_are_one_session() {
     );
 }
 
+/// A plain copy without results, whose name sorts first, hides no results.
+#[test]
+fn a_copy_without_results_does_not_replace_the_analysed_session() {
+    let lab = Lab::with_sessions(1);
+    write_results(&lab, 0);
+    let copy = lab.path().join("-.session.sqlite");
+    std::fs::copy(lab.session(0), &copy).unwrap();
+    for order in [[lab.session(0), copy.clone()], [copy, lab.session(0)]] {
+        let mut catalogue = lab.open();
+        for file in order {
+            catalogue.register(&[file]).unwrap();
+        }
+        let sql = "SELECT name FROM session_file WHERE is_source = 1";
+        assert_eq!(column(&lab.file(), sql), ["0.session.sqlite"]);
+        assert_eq!(column(&lab.file(), "SELECT count(*) FROM analysis"), ["1"]);
+        assert_eq!(stale(&lab), [""; 0]);
+        drop(catalogue);
+        std::fs::remove_file(lab.file()).unwrap();
+    }
+}
+
 #[test]
 fn a_catalogue_of_several_folders_keeps_them_apart() {
     let (one, two) = (Lab::with_sessions(2), Lab::with_sessions(1));
