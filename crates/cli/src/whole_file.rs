@@ -11,11 +11,14 @@ use crate::paths::folder_of;
 const PARTIAL: &str = ".partial-";
 
 /// Replaces the file at `path` in one step: writes `bytes` to a temporary file beside it, syncs it to the disk and renames it. With
-/// several writers, the complete file of the last one stays.
+/// several writers, the complete file of the last one stays. A device or pipe, such as `/dev/null`, takes the bytes and stays.
 ///
 /// # Errors
 /// The error of the system; then the file at `path` is unchanged and no temporary file is left.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if is_device(path) {
+        return OpenOptions::new().write(true).open(path)?.write_all(bytes);
+    }
     remove_leftovers(path);
     let (partial, mut file) = create_partial(path)?;
     let written = file
@@ -33,9 +36,17 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// The error of the system.
 pub(crate) fn probe(path: &Path) -> io::Result<()> {
+    if is_device(path) {
+        return OpenOptions::new().write(true).open(path).map(drop);
+    }
     let (partial, file) = create_partial(path)?;
     drop(file);
     fs::remove_file(partial)
+}
+
+/// True for what is neither a file nor a folder.
+fn is_device(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
 /// Bytes at the start of a file by which its kind is told.
@@ -134,6 +145,20 @@ mod tests {
         assert_eq!(fs::read_to_string(&path).unwrap(), "there");
         let missing = probe(&folder.path().join("none/x.json")).unwrap_err();
         assert_eq!(missing.kind(), io::ErrorKind::NotFound);
+    }
+
+    /// A socket stands for a device, which only root can create: it cannot be opened as a file, and would have been replaced.
+    #[test]
+    #[cfg(unix)]
+    fn a_device_is_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("socket");
+        let _listener = std::os::unix::net::UnixListener::bind(&path).unwrap();
+        assert!(probe(&path).is_err() && write(&path, b"x").is_err());
+        assert!(is_device(&path));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        write(Path::new("/dev/null"), b"x").unwrap();
+        assert!(is_device(Path::new("/dev/null")));
     }
 
     #[test]
