@@ -69,7 +69,8 @@ fn session(seed: u64) -> Analysis {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("interval.session.sqlite");
     let rig = simulated_rig(&SimConfig::new(SKIN, SimLevel::Optical));
-    record(&protocol, &plan, rig, &path, |_, _| {}).expect("a session");
+    let report = record(&protocol, &plan, rig, &path, |_, _| {}).expect("a session");
+    assert!(report.valid > LOCATIONS);
     let opened = Session::open(&path, AnalysisOptions::default()).expect("a session");
     let aligned = opened.read_input().expect("its input").align();
     analyze(&aligned.input, &aligned.events).expect("an analysis")
