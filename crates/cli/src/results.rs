@@ -275,8 +275,8 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
     let analysis = &results.analysis;
     if !analysis.is_valid() {
         let next = if analysis.may_calibrate() {
-            "see in the report why each press does not count; record what is missing with `skinrig resume`, or undo the rule or the \
-             selection that excludes all"
+            "see in the report why each press does not count; record what is missing with `skinrig resume` (an import: \
+             mend its files and import them again), or undo the rule or the selection that excludes all"
         } else if analysis.alignment.is_usable() {
             "fix what the audit reports (each finding has a next step), then import or analyse again"
         } else {
@@ -300,9 +300,15 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
     }
     match metrics.rmse_mm.value {
         Some(rmse) if rmse <= limit => Ok(Exit::Ok),
-        Some(rmse) => Err(Failure::limit(format!(
-            "scored RMSE: expected at most {limit} mm (--max-rmse), found {rmse:.3} mm"
-        ))),
+        Some(rmse) => {
+            let short = format!("{rmse:.3}");
+            // As many digits as tell it from the limit.
+            let is_above = short.parse::<f64>().is_ok_and(|found| found > limit);
+            let found = if is_above { short } else { rmse.to_string() };
+            Err(Failure::limit(format!(
+                "scored RMSE: expected at most {limit} mm (--max-rmse), found {found} mm"
+            )))
+        }
         None => Err(Failure::limit(format!(
             "scored RMSE: expected at most {limit} mm (--max-rmse), found none: no scored press was located"
         ))),

@@ -19,6 +19,7 @@ use crate::shelf::Shelf;
 /// [`Failure::input`] when the folder cannot be read.
 pub(crate) fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
     let mut found = Shelf::told(&args.folder)?.sessions;
+    let in_all = found.len();
     if let Some(prototype_id) = &args.prototype {
         found.retain(|s| s.prototype() == Some(prototype_id));
     }
@@ -28,7 +29,13 @@ pub(crate) fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
         return Ok(Exit::Ok);
     }
     if found.is_empty() {
-        outln!("no sessions in {}", args.folder.display());
+        match in_all {
+            0 => outln!("no sessions in {}", args.folder.display()),
+            n => outln!(
+                "none of {n} session(s) in {} is of this prototype and has these tags",
+                args.folder.display()
+            ),
+        }
         return Ok(Exit::Ok);
     }
     let table = Table::new([

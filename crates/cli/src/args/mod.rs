@@ -268,8 +268,12 @@ pub(crate) enum Command {
 
     /// Add sessions to a data lake: presses, estimates, features, metrics and poses as one Parquet dataset.
     #[command(after_help = "Example:\n  skinrig lake sessions/ --to lake/\n\n\
-        Partitions: analysis version, prototype, bench, day. Sessions that are there are not added again. In DuckDB:\n  \
-        SELECT prototype, avg(error_mm) FROM read_parquet('lake/estimates/**/*.parquet', hive_partitioning = true) GROUP BY prototype")]
+        Partitions: analysis version, prototype, bench, day. Sessions that are there are not added again. In DuckDB, the\n\
+        mean error of the scored presses that count:\n  \
+        SELECT p.prototype, avg(e.error_mm)\n  \
+        FROM read_parquet('lake/estimates/**/*.parquet', hive_partitioning = true) e\n  \
+        JOIN read_parquet('lake/presses/**/*.parquet', hive_partitioning = true) p USING (analysis, session_id, press)\n  \
+        WHERE p.role = 'score' AND p.verdict = 'valid' GROUP BY p.prototype")]
     Lake(LakeArgs),
 
     /// Publish sessions or a selection as an RO-Crate: data card, checksums, bundles, protocols, and numbers to derive again.

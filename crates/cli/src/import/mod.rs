@@ -312,6 +312,14 @@ fn open(
             )
         }
         FileKind::Raw => {
+            if let Some(name) = stream {
+                return Err(Failure::input(format!(
+                    "{}: expected an HDF5 file with a stream `{name}`, found a RAW file, which has one stream\n  \
+                     next: leave out --stream{}",
+                    path.display(),
+                    camera.index() + 1
+                )));
+            }
             let reader = RawReader::open(&path).map_err(Failure::input)?;
             let format = reader.header().format;
             check_words(&path, &reader).map_err(Failure::input)?;

@@ -281,6 +281,11 @@ fn raw_files_that_are_cut_off_or_empty() {
     let raw = only(&lab.path("e"), ".camera2.raw");
     let bytes = std::fs::read(&raw).unwrap();
     data.cameras[1] = raw.clone();
+    let mut named = data.arguments(&lab.path("s"));
+    named.extend(["--stream2".into(), "data/left".into()]);
+    skinrig(&named)
+        .code(2)
+        .expect_stderr(&[".camera2.raw", "`data/left`", "leave out --stream2"]);
     std::fs::write(&raw, &bytes[..bytes.len() - 3]).unwrap();
     assert_refused(
         &lab,

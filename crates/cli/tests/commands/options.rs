@@ -225,6 +225,16 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
     skinrig(&["analyze", &session, "--max-rmse", &above]).code(0);
     let below = (rmse - 0.01).to_string();
     skinrig(&["analyze", &session, "--max-rmse", &below]).code(4);
+    // The value that is printed is above the limit too, by however little it is missed.
+    for limit in [
+        f64::from_bits(rmse.to_bits() - 1),
+        (rmse * 1e3).floor() / 1e3,
+    ] {
+        let refused = skinrig(&["analyze", &session, "--max-rmse", &limit.to_string()]).code(4);
+        let (_, found) = refused.err.split_once("found ").unwrap();
+        let found: f64 = found.split(' ').next().unwrap().parse().unwrap();
+        assert!(found > limit, "{}", refused.err);
+    }
     // The error of the few presses that are left when a rule excludes the others meets no limit, and compares no skins.
     let few = lab.text("few");
     let rule = "analysis={calibration: none, cluster_threshold: fixed, min_samples: 20, min_cluster_events: 5000}";

@@ -90,6 +90,9 @@ fn evt2(random: &[(u8, u16)], quiet: bool) -> Vec<u8> {
 /// The CD events of EVT3 words whose row, column and time are known, on a sensor of this size.
 fn one_by_one(bytes: &[u8], geometry: Geometry) -> Vec<CdEvent> {
     let (mut high, mut low, mut epoch) = (None::<u64>, 0, 0_u64);
+    // Before a step that was no progress, and to where it went: taken back if the next word goes on from before it.
+    let mut doubtful = None::<(u64, u64, u64)>;
+    let progress = |from: u64, to: u64| to >= from && to - from <= 1 << 11;
     let (mut row, mut vector) = (None, None::<(u16, u16)>);
     let mut events = Vec::new();
     for word in bytes.chunks_exact(2) {
@@ -127,8 +130,14 @@ fn one_by_one(bytes: &[u8], geometry: Geometry) -> Vec<CdEvent> {
                 if high != Some(next) {
                     low = 0;
                 }
-                if high.is_some_and(|high| high > next && high - next > 1 << 11) {
-                    epoch += 1 << 24;
+                if let Some(high) = high.filter(|high| !progress(*high, next)) {
+                    match doubtful.replace((high, epoch, next)) {
+                        Some((last, at, found)) if found == high && progress(last, next) => {
+                            (epoch, doubtful) = (at, None);
+                        }
+                        _ if high > next && high - next > 1 << 11 => epoch += 1 << 24,
+                        _ => {}
+                    }
                 }
                 high = Some(next);
             }
