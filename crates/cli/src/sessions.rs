@@ -32,7 +32,7 @@ pub(crate) fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
         match in_all {
             0 => outln!("no sessions in {}", args.folder.display()),
             n => outln!(
-                "none of {n} session(s) in {} is of this prototype and has these tags",
+                "no matching sessions in {}, {n} in all",
                 args.folder.display()
             ),
         }

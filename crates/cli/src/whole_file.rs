@@ -36,8 +36,9 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// # Errors
 /// The error of the system.
 pub(crate) fn probe(path: &Path) -> io::Result<()> {
+    // To open and close a pipe would end what its reader reads.
     if is_device(path) {
-        return OpenOptions::new().write(true).open(path).map(drop);
+        return Ok(());
     }
     let (partial, file) = create_partial(path)?;
     drop(file);
@@ -154,11 +155,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("socket");
         let _listener = std::os::unix::net::UnixListener::bind(&path).unwrap();
-        assert!(probe(&path).is_err() && write(&path, b"x").is_err());
+        probe(&path).unwrap();
+        assert!(write(&path, b"x").is_err());
         assert!(is_device(&path));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        write(Path::new("/dev/null"), b"x").unwrap();
-        assert!(is_device(Path::new("/dev/null")));
     }
 
     #[test]

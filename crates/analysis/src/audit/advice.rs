@@ -52,8 +52,8 @@ pub(super) const fn of(fault: Fault) -> &'static str {
             "check that the camera was connected and running, and that the right stream was read"
         }
         Fault::EventsOutOfOrder => {
-            "read the recording with `skinrig inspect`; blocks of the file were exchanged, or written by several threads: copy it from the \
-             camera's computer again"
+            "`skinrig inspect` shows where the time of the recording runs backwards: blocks of it were exchanged. Copy an imported \
+             file from the camera's computer again"
         }
         Fault::NoTriggers => "check the cable, the channel and the level of the trigger line",
         Fault::NoTruth => "check the pose stream of the robot, or the position table of the import",

@@ -18,7 +18,7 @@ const MAX_NEIGHBOURS: usize = 200;
 /// Number of presses whose nearest location tells how far apart locations are.
 const SAMPLED: usize = 200;
 
-/// The quarter of the absolute values of a normal distribution with standard deviation 1.
+/// Lower quartile of the absolute value of a standard normal variable.
 const QUARTER_OF_SIGMA: f64 = 0.3186;
 
 /// Neighbours of each press of a path with their weights.

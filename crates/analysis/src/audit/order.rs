@@ -25,10 +25,11 @@ fn place(finding: &Finding) -> u8 {
     match finding.fault {
         Fault::ClockWrong if is_seen_in_bursts(finding) => 5,
         Fault::JournalContradictory => 0,
-        Fault::NoEvents => 1,
-        Fault::EventsOutOfOrder => 2,
-        Fault::RecordingShort => 3,
-        Fault::RecordingGap | Fault::NoTruth => 4,
+        // A camera without events has none out of order.
+        Fault::NoEvents | Fault::EventsOutOfOrder => 1,
+        Fault::RecordingShort => 2,
+        Fault::RecordingGap => 3,
+        Fault::NoTruth => 4,
         Fault::PressesMissing => 6,
         Fault::OneCameraTwice => 7,
         Fault::UnitOfPositions => 8,
