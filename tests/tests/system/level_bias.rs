@@ -1,14 +1,14 @@
 //! Differences between simulation levels in the figures that a scene can set tolerances on, over simulated skins with equal seeds.
 
-use skinrig_analysis::analyze;
 use skinrig_model::SimLevel;
 use skinrig_model::level_bias::{LevelBias, SceneFigure, level_bias};
 use skinrig_protocol::{Plan, Protocol};
-use skinrig_results::{AnalysisOptions, Session};
-use skinrig_sim::{SimConfig, simulated_rig};
+use skinrig_sim::SimConfig;
 use skinrig_statistics::distributions::student_quantile;
 use skinrig_statistics::seeded;
-use skinrig_tests::{planned, record};
+use skinrig_tests::planned;
+
+use crate::simulated::simulated;
 
 const PROTOCOL: &str = "
 skinrig: 1
@@ -62,14 +62,8 @@ fn campaign(seed: u64) -> (Protocol, Plan) {
 /// The figures of one simulated session, by [`SceneFigure::ALL`]; rates in events per second.
 fn figures(seed: u64, level: SimLevel) -> [f64; 4] {
     let (protocol, plan) = campaign(seed);
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("level.session.sqlite");
-    let rig = simulated_rig(&SimConfig::new(seed, level));
-    let report = record(&protocol, &plan, rig, &path, |_, _| {}).expect("a session");
+    let (report, analysis) = simulated(&protocol, &plan, &SimConfig::new(seed, level));
     assert_eq!(report.valid, 78);
-    let opened = Session::open(&path, AnalysisOptions::default()).expect("a session");
-    let aligned = opened.read_input().expect("its input").align();
-    let analysis = analyze(&aligned.input, &aligned.events).expect("an analysis");
     let rates = analysis.bit_rates.expect("rates");
     let onsets = analysis.latency.and_then(|l| l.from_contact);
     let onset_ms = onsets.and_then(|o| o.median_ms.value);

@@ -14,4 +14,5 @@ mod overflow;
 mod paper_scene;
 mod retakes;
 mod session_intervals;
+mod simulated;
 mod unusual;

@@ -1,13 +1,13 @@
 //! How often the intervals of a session hold the mean over sessions of one skin, each at locations and with a calibration of its own.
 
 use rayon::prelude::*;
-use skinrig_analysis::analyze;
 use skinrig_analysis::result::{Analysis, Estimate};
 use skinrig_model::SimLevel;
-use skinrig_results::{AnalysisOptions, Session};
-use skinrig_sim::{SimConfig, simulated_rig};
+use skinrig_sim::SimConfig;
 use skinrig_statistics::seeded;
-use skinrig_tests::{planned, record};
+use skinrig_tests::planned;
+
+use crate::simulated::simulated;
 
 const PROTOCOL: &str = "
 skinrig: 1
@@ -66,14 +66,9 @@ fn session(seed: u64) -> Analysis {
         .collect();
     let text = PROTOCOL.replace("POINTS", &format!("[{}]", points.join(", ")));
     let (protocol, plan) = planned(text.trim_start()).expect("a plan");
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("interval.session.sqlite");
-    let rig = simulated_rig(&SimConfig::new(SKIN, SimLevel::Optical));
-    let report = record(&protocol, &plan, rig, &path, |_, _| {}).expect("a session");
+    let (report, analysis) = simulated(&protocol, &plan, &SimConfig::new(SKIN, SimLevel::Optical));
     assert!(report.valid > LOCATIONS);
-    let opened = Session::open(&path, AnalysisOptions::default()).expect("a session");
-    let aligned = opened.read_input().expect("its input").align();
-    analyze(&aligned.input, &aligned.events).expect("an analysis")
+    analysis
 }
 
 /// Share of the intervals that hold the mean, percent.
