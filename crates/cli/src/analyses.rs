@@ -37,6 +37,11 @@ pub(crate) fn tradeoff_path(session: &Path, name: Option<&str>) -> PathBuf {
     path(session, name, ".tradeoff.html")
 }
 
+/// Path of the page of `scene predict`; its results have the same name with another ending.
+pub(crate) fn scene_path(session: &Path) -> PathBuf {
+    beside(session, ".scene.html")
+}
+
 fn path(session: &Path, name: Option<&str>, ending: &str) -> PathBuf {
     match name {
         None => beside(session, ending),

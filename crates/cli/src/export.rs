@@ -297,6 +297,7 @@ pub(crate) fn derived(
     let mut results = results::analyze_shown(session, AnalysisRequest::default())?;
     // Measured on one machine at one time: it does not follow from the session.
     results.tradeoff = None;
+    results.scene = None;
     let mut written = documents(&results, folder)?;
     let source = Source {
         reader,

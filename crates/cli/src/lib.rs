@@ -8,6 +8,7 @@ mod analyses;
 pub mod analysis_request;
 mod analyze;
 mod args;
+mod beside_session;
 mod catalogue;
 mod challenge;
 pub mod check;
@@ -62,7 +63,6 @@ mod subprocess;
 mod supervise;
 mod tag;
 mod tradeoff;
-mod tradeoff_file;
 mod verify;
 mod version;
 mod view;
@@ -159,7 +159,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Report(a) => analyze::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, output),
-        Command::Scene(a) => scene::scene(a, json),
+        Command::Scene(a) => scene::scene(a, &command_line(arguments), output),
         Command::Online(a) => online::online(a, output),
         Command::Verify(a) => verify::verify(a, json),
         Command::Salvage(a) => salvage::salvage(a, json),

@@ -8,6 +8,16 @@ use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakeRow};
 use skinrig_results::{Origin, differences_from_optical};
 
+/// What the data of a session come from: `simulated, optical`.
+pub(crate) fn origin_in_words(header: &RunHeader) -> String {
+    let kind = Origin::of(header).map_or("of unknown origin", Origin::name);
+    if header.rig_name.starts_with(kind) {
+        header.rig_name.clone()
+    } else {
+        format!("{kind}, {}", header.rig_name)
+    }
+}
+
 /// Reads the provenance block of a session.
 ///
 /// # Errors

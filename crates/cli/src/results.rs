@@ -7,15 +7,16 @@ use skinrig_analysis::result::LEAST_LOCATED;
 use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, LegStart};
 use skinrig_catalogue::results_digest;
+use skinrig_report::scene_prediction::ScenePrediction;
 use skinrig_report::{Provenance, ReportInput, SelectionEffect, Variant};
 use skinrig_results::{AlignedSession, AnalyzedSession, Session};
 
 use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
+use crate::beside_session::{self, BesideSessionError, SCENE, SessionIdentity, TRADEOFF};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
 use crate::terminal::Output;
-use crate::tradeoff_file::{SessionIdentity, TradeoffFileError};
 use crate::whole_file;
 
 /// The results of one session.
@@ -29,7 +30,9 @@ pub struct Results {
     /// Their provenance.
     pub provenance: Provenance,
     /// The trade-off stored beside the session, or why it cannot be read.
-    pub tradeoff: Option<Result<Tradeoff, TradeoffFileError>>,
+    pub tradeoff: Option<Result<Tradeoff, BesideSessionError>>,
+    /// What its scene predicts, stored beside the session, or why it cannot be read.
+    pub scene: Option<Result<ScenePrediction, BesideSessionError>>,
 }
 
 impl Results {
@@ -43,6 +46,7 @@ impl Results {
                 .tradeoff
                 .as_ref()
                 .map(|t| t.as_ref().map_err(|e| e as _)),
+            scene: self.scene.as_ref().map(|s| s.as_ref().map_err(|e| e as _)),
         }
     }
 }
@@ -134,7 +138,8 @@ fn complete(
         analysis,
         legs,
         provenance,
-        tradeoff: crate::tradeoff_file::beside_session(path, &identity),
+        tradeoff: beside_session::read(&TRADEOFF, path, &identity),
+        scene: beside_session::read(&SCENE, path, &identity),
     })
 }
 

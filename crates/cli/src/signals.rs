@@ -129,6 +129,22 @@ impl Operator {
     }
 }
 
+/// A flag that the first ctrl-C sets; the second ends the program.
+///
+/// # Errors
+/// As [`on_ctrl_c`].
+pub(crate) fn leave_on_ctrl_c() -> Result<Arc<AtomicBool>, SignalError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    on_ctrl_c(move |times| {
+        if times > 1 {
+            std::process::exit(i32::from(Exit::Stopped.code()));
+        }
+        asked.store(true, Ordering::Relaxed);
+    })?;
+    Ok(stop)
+}
+
 /// Calls `react` with 1, 2, 3, ... each time ctrl-C is pressed, on a separate thread, until the program ends.
 ///
 /// # Errors

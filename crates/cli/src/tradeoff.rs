@@ -1,8 +1,7 @@
 //! `skinrig tradeoff`: the trade-off between speed and accuracy, measured on a session.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use rustix::time::{ClockId, clock_gettime};
 use skinrig_analysis::AnalysisError;
@@ -19,14 +18,14 @@ use skinrig_text::Paint;
 use crate::analyses::tradeoff_path;
 use crate::analysis_request::AnalysisRequest;
 use crate::args::{CostKind, TradeoffArgs};
+use crate::beside_session::{SessionIdentity, TRADEOFF};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::file_name;
 use crate::phase::Phase;
 use crate::results::{check_writable, not_official, open, write, write_named};
 use crate::selection;
-use crate::signals::on_ctrl_c;
+use crate::signals::leave_on_ctrl_c;
 use crate::terminal::Output;
-use crate::tradeoff_file::{FORMAT, SessionIdentity};
 use skinrig_report::Variant;
 
 /// CPU time of this thread, s.
@@ -206,20 +205,6 @@ const fn cost_name(cost: CostKind) -> &'static str {
     }
 }
 
-/// A flag that the first ctrl-C sets; the second ends the program.
-fn leave_on_ctrl_c() -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    on_ctrl_c(move |times| {
-        if times > 1 {
-            std::process::exit(i32::from(Exit::Stopped.code()));
-        }
-        asked.store(true, Ordering::Relaxed);
-    })
-    .map_err(Failure::internal)?;
-    Ok(stop)
-}
-
 /// The best choice so far, with its interval.
 fn progress_in_words(progress: &Progress<'_>) -> String {
     let best = progress.best.map(|row| {
@@ -283,7 +268,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         least_located: args.min_located.map(|percent| percent / 100.0),
     };
     let measured = {
-        let stop = leave_on_ctrl_c()?;
+        let stop = leave_on_ctrl_c().map_err(Failure::internal)?;
         if args.full {
             errln!("measuring all combinations; ctrl-C leaves with the best so far");
         }
@@ -306,7 +291,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
     let recommendations = recommendations(&measured, args);
     let own = variant.as_ref().map(Variant::changes_with_selection);
     let result = &measured.tradeoff;
-    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "session": identity, "rig": rig, "variant": variant, "machine": machine(), "tradeoff": result });
+    let mut document = serde_json::json!({ "format": TRADEOFF.format, "format_version": TRADEOFF.version, "session": identity, "rig": rig, "variant": variant, "machine": machine(), "tradeoff": result });
     let found = recommendations.iter().map(|a| {
         let found = a.found.as_ref().ok();
         let row = found.map(|f| f.row);

@@ -10,6 +10,7 @@ mod locations;
 mod metrics;
 mod no_result;
 mod result;
+pub mod scene;
 mod sequential;
 mod subject;
 mod table;

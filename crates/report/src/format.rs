@@ -161,6 +161,15 @@ pub(crate) fn plain(text: &str) -> String {
     skinrig_model::text::visible(&text.replace(['\n', '\t'], " ")).into_owned()
 }
 
+/// With an upper-case first letter.
+pub(crate) fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => first.to_uppercase().chain(letters).collect(),
+        None => String::new(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -20,6 +20,7 @@ pub mod page;
 pub mod provenance;
 pub mod published;
 pub mod scene_check;
+pub mod scene_prediction;
 pub mod style;
 pub mod svg;
 pub mod tradeoff;

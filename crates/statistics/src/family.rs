@@ -117,8 +117,9 @@ pub fn compare_all(
         .collect())
 }
 
-/// Holm (1979) correction: step down, monotone, at most 1.
-fn holm(p: &[Option<f64>]) -> Vec<Option<f64>> {
+/// Holm (1979) correction of the p values of a family: step down, monotone, at most 1. Those that do not exist do not count.
+#[must_use]
+pub fn holm(p: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut order: Vec<usize> = (0..p.len()).filter(|i| p[*i].is_some()).collect();
     let value = |i: usize| p[i].unwrap_or(1.0);
     order.sort_by(|a, b| value(*a).total_cmp(&value(*b)));

@@ -51,7 +51,7 @@ pub use comparison::{
 };
 pub use error::{ComparisonError, Side};
 pub use failures::rms_with_failures;
-pub use family::{AdjustedComparison, Pair, PairSelection, compare_all};
+pub use family::{AdjustedComparison, Pair, PairSelection, compare_all, holm};
 pub use question::{ComparisonTarget, ImprovementDirection, Pairing, Settings};
 pub use sample::{Count, Kind, Position, Sample, SampleFault};
 pub use sessions::SessionSpread;

@@ -13,6 +13,7 @@ mod online;
 mod overflow;
 mod paper_scene;
 mod retakes;
+mod scene_prediction;
 mod session_intervals;
 mod simulated;
 mod unusual;

@@ -4,7 +4,7 @@ use skinrig_analysis::analyze;
 use skinrig_analysis::result::Analysis;
 use skinrig_controller::RunReport;
 use skinrig_protocol::{Plan, Protocol};
-use skinrig_results::{AnalysisOptions, Session};
+use skinrig_results::{AlignedSession, AnalysisOptions, Session};
 use skinrig_sim::{SimConfig, simulated_rig};
 use skinrig_tests::record;
 
@@ -14,12 +14,23 @@ pub(crate) fn simulated(
     plan: &Plan,
     config: &SimConfig,
 ) -> (RunReport, Analysis) {
+    aligned(protocol, plan, config, |report, session| {
+        let analysis = analyze(&session.input, &session.events).expect("an analysis");
+        (report, analysis)
+    })
+}
+
+/// What `make` makes of a recorded session; its file is not kept.
+pub(crate) fn aligned<T>(
+    protocol: &Protocol,
+    plan: &Plan,
+    config: &SimConfig,
+    make: impl FnOnce(RunReport, AlignedSession) -> T,
+) -> T {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("simulated.session.sqlite");
     let report =
         record(protocol, plan, simulated_rig(config), &path, |_, _| {}).expect("a session");
     let opened = Session::open(&path, AnalysisOptions::default()).expect("a session");
-    let aligned = opened.read_input().expect("its input").align();
-    let analysis = analyze(&aligned.input, &aligned.events).expect("an analysis");
-    (report, analysis)
+    make(report, opened.read_input().expect("its input").align())
 }

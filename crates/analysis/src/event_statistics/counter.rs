@@ -2,7 +2,7 @@
 
 use skinrig_model::{CameraId, CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH};
 
-use super::polarity::PolarityCounter;
+use super::presses::PressCounter;
 use super::values::{Bin, EventStatistics, IntervalLaw, Ring};
 
 const WIDTH: usize = SENSOR_WIDTH as usize;
@@ -54,7 +54,7 @@ pub(super) struct Counter {
     interval_bins: LogBins,
     rings: Rings,
     dispersion: Dispersion,
-    polarity: PolarityCounter,
+    presses: PressCounter,
 }
 
 /// Cells per ring that lie on the sensor, and those with an event.
@@ -162,7 +162,7 @@ impl Counter {
             interval_bins: LogBins::new(10.0, PER_DECADE),
             rings: Rings::default(),
             dispersion: Dispersion::default(),
-            polarity: PolarityCounter::new(presses),
+            presses: PressCounter::new(presses),
         }
     }
 
@@ -185,7 +185,7 @@ impl Counter {
         }
         self.dispersion
             .add(event.t_us.saturating_sub(self.first_us));
-        self.polarity.add(event);
+        self.presses.add(event);
         self.cell_last_us[y / CELL_PX * CELLS[0] + x / CELL_PX] = event.t_us + 1;
         let pixel = y * WIDTH + x;
         self.counts[pixel] = self.counts[pixel].saturating_add(1);
@@ -283,7 +283,8 @@ impl Counter {
             pixels: pixels.bins(),
             intervals: self.law(),
             interval_bins: self.interval_bins.bins(),
-            polarity: self.polarity.polarity(),
+            polarity: self.presses.polarity(),
+            course: self.presses.course(),
         }
     }
 

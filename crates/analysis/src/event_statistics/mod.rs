@@ -4,12 +4,12 @@
 use skinrig_model::{CameraId, CdEvent};
 
 mod counter;
-mod polarity;
+mod presses;
 #[cfg(test)]
 mod tests;
 mod values;
 
-pub use self::polarity::PressPolarity;
+pub use self::presses::{PressCourse, PressPolarity};
 pub use self::values::{Bin, EventStatistics, IntervalLaw, Ring};
 
 use self::counter::Counter;

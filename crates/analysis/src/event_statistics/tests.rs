@@ -164,3 +164,33 @@ fn polarity_is_counted_from_contacts_and_from_lifts() {
     );
     assert_eq!(of(events.to_vec()).polarity, None);
 }
+
+#[test]
+fn rates_follow_contacts_and_lifts_as_long_as_half_of_the_presses_do() {
+    // Two presses: 30 and 50 ms long, the second one 600 ms after the lift of the first.
+    let presses = [(1e6, 1.03e6), (1.63e6, 1.68e6)];
+    let events = [
+        event(950_000, 1, 1, true),
+        event(1_005_000, 1, 1, true),
+        event(1_041_000, 1, 1, true),
+        // In the 100 ms before the second contact, not in the course of the lift.
+        event(1_560_000, 1, 1, true),
+        event(1_630_000, 1, 1, true),
+        event(1_639_999, 1, 1, true),
+        event(1_671_000, 1, 1, true),
+        event(1_691_000, 1, 1, true),
+    ];
+    let course = with_presses(&events, &presses).course.unwrap();
+    assert_eq!(course.bin_ms, 10.0);
+    assert_eq!(course.before_per_s, Some(10.0));
+    // The last two bins are those of the second press alone.
+    assert_eq!(course.contact_per_s, [150.0, 0.0, 0.0, 0.0, 100.0]);
+    assert_eq!(course.lift_per_s[..3], [0.0, 100.0, 0.0]);
+    assert_eq!(course.lift_per_s.len(), 60);
+    // Without time between presses there is no rate before them.
+    let close = [(1e6, 1.1e6), (1.2e6, 1.3e6), (1.4e6, 1.5e6)];
+    let course = with_presses(&events, &close).course.unwrap();
+    assert_eq!(course.lift_per_s.len(), 10);
+    assert_eq!(course.before_per_s, Some(10.0));
+    assert_eq!(of(events.to_vec()).course, None);
+}

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use skinrig_model::CameraId;
 
-use super::polarity::PressPolarity;
+use super::presses::{PressCourse, PressPolarity};
 
 /// Statistics of one camera; `None` where the recording has too few events.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -40,6 +40,8 @@ pub struct EventStatistics {
     pub interval_bins: Vec<Bin>,
     /// Polarity at contacts and lifts.
     pub polarity: Option<PressPolarity>,
+    /// Rates around contacts and lifts.
+    pub course: Option<PressCourse>,
 }
 
 /// How many values lie from `from` to `to`, which is not in it.

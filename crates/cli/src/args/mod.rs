@@ -30,7 +30,7 @@ pub(crate) use self::files::{
     SalvageArgs, SchemaArgs, SchemaKind, SelectArgs, SessionsArgs, ShowArgs, TagArgs,
 };
 pub(crate) use self::groups::{command, parse};
-pub(crate) use self::scene::{SceneArgs, SceneCheckArgs, SceneCommand};
+pub(crate) use self::scene::{SceneArgs, SceneCheckArgs, SceneCommand, ScenePredictArgs};
 pub(crate) use self::values::StopRule;
 use crate::catalogue::args::CatalogueArgs;
 use crate::exit::Exit;
@@ -215,8 +215,11 @@ pub(crate) enum Command {
     )]
     Tradeoff(TradeoffArgs),
 
-    /// Check how like a camera the events of a session are.
-    #[command(after_help = "Example:\n  skinrig scene check sessions/NAME.session.sqlite")]
+    /// Check how like a camera the events of a session are, and how like its scene the session is.
+    #[command(
+        after_help = "Examples:\n  skinrig scene check sessions/NAME.session.sqlite\n  \
+        skinrig scene predict sessions/NAME.session.sqlite"
+    )]
     Scene(SceneArgs),
 
     /// Replay a session as a live source: how soon touches are felt, where, and how often wrongly.

@@ -91,3 +91,64 @@ fn too_many_and_other_files_are_refused() {
         .code(2)
         .expect_stderr(&["expected at most 4 recordings for a page, found 5"]);
 }
+
+#[test]
+fn a_session_is_like_its_scene_and_unlike_another_one() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &["--level", "optical"]));
+    let own = [
+        "scene",
+        "predict",
+        &session,
+        "--replicates",
+        "8",
+        "--seed",
+        "100",
+    ];
+    let out = skinrig(&own).code(0).out;
+    assert!(out.contains("as predicted"), "{out}");
+    assert!(out.lines().count() <= 12, "{out}");
+    let out = skinrig(&[&own[..], &["-v"]].concat()).code(0).out;
+    assert!(out.contains("events of a press (kev/s)"), "{out}");
+
+    // A skin that returns three times the light is another one; the report of the session then says so.
+    let change = "scene.skin.flank_brightness=6";
+    let found = skinrig(&[&["--json"], &own[..], &["--set", change]].concat())
+        .code(0)
+        .json();
+    let figures = found["prediction"]["figures"].as_array().unwrap();
+    let p = |name: &str| {
+        let row = figures.iter().find(|row| row["figure"] == name).unwrap();
+        row["predicted"]["p"].as_f64().unwrap()
+    };
+    assert!(p("press_rate") < 0.05, "{found}");
+    assert_eq!(found["prediction"]["seeds"].as_array().unwrap().len(), 8);
+    skinrig(&["analyze", &session]).code(0);
+    let page = std::fs::read_to_string(only(&lab.path("s"), ".report.html")).unwrap();
+    assert!(page.contains("Fewer events at presses than modelled"));
+    assert!(page.contains(change));
+
+    // Results of another session, or changed ones, are told and not shown.
+    let results = only(&lab.path("s"), ".scene.json");
+    let changed = std::fs::read_to_string(&results).unwrap();
+    std::fs::write(&results, changed.replace("press_rate", "idle_rate")).unwrap();
+    skinrig(&["analyze", &session]).code(0);
+    let page = std::fs::read_to_string(only(&lab.path("s"), ".report.html")).unwrap();
+    assert!(page.contains("skinrig scene predict` rewrites it"));
+}
+
+#[test]
+fn what_cannot_be_predicted_is_refused() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let predict = |more: &[&str]| skinrig(&[&["scene", "predict", &session], more].concat());
+    predict(&["--replicates", "7"])
+        .code(2)
+        .expect_stderr(&["--replicates"]);
+    predict(&["--set", "scene.skin.creep=soft"])
+        .code(2)
+        .expect_stderr(&["scene.skin.creep"]);
+    predict(&["--level", "kinematic", "--replicates", "8"])
+        .code(2)
+        .expect_stderr(&["expected at least 8 simulated sessions that can be analysed"]);
+}

@@ -3,8 +3,9 @@
 use skinrig_model::RunEnd;
 
 use crate::document::{Group, Note, Text};
-use crate::format::{grouped, number};
+use crate::format::{capitalised, grouped, number};
 use crate::input::ReportInput;
+use crate::scene_prediction::sentence;
 use crate::{course, derive};
 
 /// Interruptions that ended the run.
@@ -35,8 +36,34 @@ pub(super) fn notices(input: &ReportInput<'_>) -> Group {
         .with_all(off_sensor.map(|text| Note::new("Left out.", format!("{text}."))))
         .with_all(troubles)
         .with_all(silent)
+        .with_all(scene(input))
         .with_all(quiet)
         .with_all(notes)
+}
+
+/// The audit's row on the scene, if its predictions were simulated.
+fn scene(input: &ReportInput<'_>) -> Option<Note> {
+    let note = match input.scene? {
+        Err(e) => Note::new("Scene.", e.to_string()).bad(),
+        Ok(found) => {
+            let head = Text::from(format!(
+                "Simulated as {}: {}.",
+                found.scene_in_words(),
+                found.verdict()
+            ));
+            let differing = found.differing();
+            let text = differing.iter().fold(head, |text, row| {
+                text.line_break().add(capitalised(&sentence(row))).add(".")
+            });
+            let note = Note::new("Scene.", text);
+            if differing.is_empty() {
+                note.good()
+            } else {
+                note.warning()
+            }
+        }
+    };
+    Some(note.test_id("scene"))
 }
 
 /// Settings that are not the protocol's own.

@@ -98,6 +98,7 @@ mod tests {
                 at_lift: 0,
                 on_at_lift: None,
             }),
+            course: None,
         };
         let recordings = [
             Recording {

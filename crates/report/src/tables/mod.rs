@@ -2,6 +2,7 @@
 
 mod events;
 mod packing;
+mod prediction;
 mod studies;
 mod table;
 mod traces;
@@ -16,6 +17,7 @@ use skinrig_settings::Settings;
 use crate::derive;
 use crate::input::ReportInput;
 pub(crate) use events::of_events;
+pub(crate) use prediction::of_prediction;
 pub(crate) use table::Table;
 
 /// Data for the script: session ID and named tables.

@@ -14,6 +14,7 @@ fn input(analysis: &skinrig_analysis::result::Analysis) -> ReportInput<'_> {
         analysis,
         provenance: support::provenance(),
         tradeoff: None,
+        scene: None,
     }
 }
 
@@ -80,6 +81,7 @@ fn hostile_text_stays_text() {
         analysis: &analysis,
         provenance,
         tradeoff: None,
+        scene: None,
     };
     let page = html(&input);
     assert!(!page.contains("<img"), "an element came through");

@@ -13,6 +13,7 @@ fn terminal_table_reads_like_this() {
         analysis: &analysis,
         provenance: support::provenance(),
         tradeoff: None,
+        scene: None,
     };
     let table = terminal_table(&input, false);
     insta::assert_snapshot!("terminal_table", table);
@@ -38,6 +39,7 @@ fn terminal_table_of_an_empty_session() {
         analysis: &analysis,
         provenance,
         tradeoff: None,
+        scene: None,
     };
     insta::assert_snapshot!("terminal_table_empty", terminal_table(&input, false));
 }
@@ -55,6 +57,7 @@ fn a_terminal_gets_no_foreign_control_characters() {
             analysis: &analysis,
             provenance,
             tradeoff: None,
+            scene: None,
         },
         false,
     );
@@ -73,6 +76,7 @@ fn counts_that_do_not_add_up_are_called_out() {
         analysis: &analysis,
         provenance: support::provenance(),
         tradeoff: None,
+        scene: None,
     };
     assert!(terminal_table(&input, false).contains("do not add up"));
     assert!(skinrig_report::html(&input).contains("do not add up"));
@@ -87,6 +91,7 @@ fn an_invalid_session_says_so_in_the_place_of_every_metric() {
             analysis,
             provenance: support::provenance(),
             tradeoff: None,
+            scene: None,
         };
         let page = skinrig_report::html(&input);
         (terminal_table(&input, false), json(&input), page)
@@ -163,6 +168,7 @@ fn json_document_has_this_layout() {
         analysis: &analysis,
         provenance: support::provenance(),
         tradeoff: None,
+        scene: None,
     };
     let document = json(&input);
     assert_eq!(document["format_version"], JSON_VERSION);
@@ -182,6 +188,7 @@ fn the_summary_answers_first_in_few_lines() {
             analysis,
             provenance: provenance.clone(),
             tradeoff: None,
+            scene: None,
         };
         let text = terminal_summary(&input, false);
         assert!(text.lines().count() <= 8, "{text}");
@@ -218,6 +225,7 @@ fn the_summary_shows_what_qualifies_the_answer() {
         analysis: &analysis,
         provenance,
         tradeoff: None,
+        scene: None,
     };
     insta::assert_snapshot!(
         "terminal_summary_of_an_odd_session",
@@ -235,6 +243,7 @@ fn terminal_table_begins_with_findings() {
         analysis: &analysis,
         provenance: support::provenance(),
         tradeoff: None,
+        scene: None,
     };
     let table = terminal_table(&input, false);
     let fault = table.find("fault     cameras swapped. Violated:").unwrap();
@@ -275,6 +284,7 @@ fn several_depths_have_lines_of_their_own_and_the_unit_says_so() {
         analysis: &analysis,
         provenance: support::provenance(),
         tradeoff: None,
+        scene: None,
     };
     let table = terminal_table(&input, false);
     assert!(table.contains("RMSE at 2.25 mm depth"), "{table}");

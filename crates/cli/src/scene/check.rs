@@ -2,35 +2,29 @@
 
 use std::path::Path;
 
-use skinrig_analysis::event_statistics::{EventStatistics, EventStatisticsCollector};
-use skinrig_analysis::{Analysis, EventSource};
+use skinrig_analysis::event_statistics::EventStatisticsCollector;
 use skinrig_formats::StreamStats;
 use skinrig_formats::inspect::FileKind;
 use skinrig_formats::raw::RawReader;
 use skinrig_model::CameraId;
 use skinrig_report::scene_check::{Recording, page, terminal_text};
-use skinrig_results::{Origin, SessionEvents};
+use skinrig_results::{Origin, SessionEvents, event_statistics};
 
 use crate::analysis_request::AnalysisRequest;
-use crate::args::{SceneArgs, SceneCheckArgs, SceneCommand};
+use crate::args::SceneCheckArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::phase::Phase;
+use crate::provenance::origin_in_words;
 use crate::results::{open, write_named};
 
 /// Recordings that fit side by side on a page.
 const MOST_ON_PAGE: usize = 4;
 
-/// Runs the command of `scene`.
+/// Statistics of recordings side by side.
 ///
 /// # Errors
 /// [`Failure::input`] for a recording that cannot be read.
-pub(crate) fn scene(args: &SceneArgs, json: bool) -> Outcome {
-    match &args.command {
-        SceneCommand::Check(args) => check(args, json),
-    }
-}
-
-fn check(args: &SceneCheckArgs, json: bool) -> Outcome {
+pub(super) fn check(args: &SceneCheckArgs, json: bool) -> Outcome {
     let count = args.recordings.len();
     if args.out.is_some() && count > MOST_ON_PAGE {
         return Err(Failure::input(format!(
@@ -131,42 +125,14 @@ fn of_session(path: &Path) -> Result<Recording, Failure> {
         Ok(found) => (Some(found.analysis), None),
         Err(e) => (None, Some(e.to_string())),
     };
-    let of = |camera| statistics(&events, camera, analysis.as_ref());
-    let (one, two) = rayon::join(|| of(CameraId::One), || of(CameraId::Two));
-    let failed = |e| Failure::input(format!("{}: {e}", path.display()));
-    let kind = origin.map_or("of unknown origin", Origin::name);
+    let cameras = event_statistics(&events, analysis.as_ref())
+        .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
     Ok(Recording {
         name: path.display().to_string(),
-        origin: if header.rig_name.starts_with(kind) {
-            header.rig_name
-        } else {
-            format!("{kind}, {}", header.rig_name)
-        },
+        origin: origin_in_words(&header),
         is_stand_in: matches!(origin, Some(Origin::Simulated | Origin::Emulated)),
         without_presses,
         broken_stream: None,
-        cameras: vec![one.map_err(failed)?, two.map_err(failed)?],
+        cameras: cameras.into(),
     })
-}
-
-fn statistics(
-    events: &SessionEvents,
-    camera: CameraId,
-    analysis: Option<&Analysis>,
-) -> Result<EventStatistics, skinrig_analysis::EventSourceError> {
-    let clock = analysis.and_then(|a| a.clocks[camera.index()]);
-    let timings = analysis
-        .iter()
-        .flat_map(|a| &a.presses)
-        .filter_map(|p| p.timing);
-    let presses: Vec<(f64, f64)> = match clock {
-        Some(clock) => timings
-            .map(|t| [t.contact, t.retract].map(|at| clock.camera_us(at.as_secs_f64() * 1e6)))
-            .map(|[contact_us, lift_us]| (contact_us, lift_us))
-            .collect(),
-        None => Vec::new(),
-    };
-    let mut collector = EventStatisticsCollector::new(&presses);
-    events.for_each_slice(camera, &mut |slice| collector.push(slice))?;
-    Ok(collector.finish(camera))
 }
