@@ -92,6 +92,7 @@ pub(crate) struct Accumulator<'a> {
     quiet_until_us: u64,
     newest_us: u64,
     late: u64,
+    repeated: u64,
     off_sensor: OffSensor,
     thinning: Thinning,
     dbscan: Dbscan,
@@ -144,6 +145,8 @@ pub(crate) struct PassOutput {
     pub pixels: Option<PixelCounts>,
     /// Events more than [`SLACK_US`] late.
     pub late: u64,
+    /// Events that equal the one before: pixel, time and polarity.
+    pub repeated: u64,
     /// Ignored events outside the sensor; all zero for a pass over cached events.
     pub off_sensor: OffSensor,
 }
@@ -191,6 +194,7 @@ impl<'a> Accumulator<'a> {
             quiet_until_us: 0,
             newest_us: 0,
             late: 0,
+            repeated: 0,
             off_sensor: OffSensor::default(),
             thinning: Thinning::new(settings.thinning, camera, settings.seed),
             dbscan: Dbscan::new(settings.eps_px, settings.min_samples),
@@ -215,12 +219,15 @@ impl<'a> Accumulator<'a> {
                 return;
             }
             // Branch-free scan of all events; only slices with a violation are searched.
-            let (mut on_sensor, mut in_order, mut last_us) = (true, true, 0);
+            let (mut on_sensor, mut in_order) = (true, true);
+            let (mut last, mut repeated) = (NO_EVENT, 0);
             for e in slice {
                 on_sensor &= is_on_sensor(e);
-                in_order &= last_us <= e.t_us;
-                last_us = e.t_us;
+                in_order &= last.t_us <= e.t_us;
+                repeated += u64::from(last == *e);
+                last = *e;
             }
+            self.repeated += repeated;
             self.off_sensor.of += slice.len() as u64;
             if !on_sensor {
                 let on: Vec<CdEvent> = slice.iter().filter(|e| is_on_sensor(e)).copied().collect();
@@ -531,6 +538,7 @@ impl<'a> Accumulator<'a> {
             cache: self.cache.filter(|_| self.late == 0),
             pixels: self.pixels,
             late: self.late,
+            repeated: self.repeated,
             off_sensor: self.off_sensor,
         })
     }

@@ -19,6 +19,9 @@ use crate::tie::{Tie, UntimedPress};
 use crate::timebase::TimeBase;
 use crate::untimed;
 
+/// Largest share of events that equal the one before; a camera sends none, since a pixel is blind after an event.
+const MOST_REPEATED: f64 = 0.1;
+
 /// Clock of a camera, and by-products of finding it.
 pub(crate) struct CameraClock {
     pub clock: Option<ClockFit>,
@@ -167,6 +170,11 @@ impl CameraClock {
             ..PassRequest::default()
         };
         let first = pass(source, camera, Accumulator::new(camera, settings, wanted))?;
+        let (repeated, events) = (first.repeated, first.off_sensor.of);
+        if repeated as f64 > MOST_REPEATED * events as f64 {
+            let cause = WarningCause::EventsRepeated { repeated, events };
+            reading.warnings.push(cause);
+        }
         Ok(Self {
             rates: first.rates,
             activity: first.activity,

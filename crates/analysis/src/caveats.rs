@@ -7,6 +7,7 @@ use crate::metrics::quantile;
 use crate::result::{
     Analysis, Estimate, PressResult, PressView, Reduction, ReductionRow, Warning, WarningCause,
 };
+use crate::storms::storms;
 
 /// A thinned row is comparable if it locates at least this share of what all events locate.
 const COMPARABLE: f64 = 0.95;
@@ -18,11 +19,13 @@ pub(crate) fn caveats(analysis: &Analysis) -> Vec<Warning> {
     let dense = CameraId::ALL
         .into_iter()
         .filter_map(|camera| dense_background(&analysis.settings, &analysis.presses, camera));
-    let compared = analysis.calibration.iter().flat_map(|c| &c.compared);
-    let left_out = compared.filter(|m| m.chosen).map(|m| &m.rmse_mm);
-    let disagree = left_out.filter_map(|l| calibration_disagrees(&analysis.scored.rmse_mm, l));
+    let left_out = analysis.left_out_one_by_one();
+    let is_known = analysis.scores_calibrating_places() == Some(true);
+    let disagree =
+        left_out.and_then(|l| calibration_disagrees(&analysis.scored.rmse_mm, &l, is_known));
     let fewer = analysis.reduction.iter().filter_map(fewer_events_do_better);
-    dense.chain(disagree).chain(fewer).collect()
+    let storms = storms(&analysis.presses);
+    dense.chain(disagree).chain(fewer).chain(storms).collect()
 }
 
 /// A caveat if the background alone creates core events in some presses: the events expected in a neighbourhood plus two standard
@@ -67,9 +70,14 @@ fn dense_background(
 }
 
 /// A caveat if the scored presses and the held-out calibration locations have errors that differ by more than both
-/// intervals.
-fn calibration_disagrees(scored: &Estimate, left_out: &Estimate) -> Option<Warning> {
-    let apart = scored.low? > left_out.high? || scored.high? < left_out.low?;
+/// intervals, with the same locator. At locations that calibrated, scored presses may have smaller ones.
+fn calibration_disagrees(
+    scored: &Estimate,
+    left_out: &Estimate,
+    is_known: bool,
+) -> Option<Warning> {
+    let is_smaller = scored.high? < left_out.low?;
+    let apart = scored.low? > left_out.high? || is_smaller && !is_known;
     let cause = WarningCause::CalibrationDisagrees {
         scored_rmse_mm: *scored,
         held_out_rmse_mm: *left_out,
@@ -113,7 +121,7 @@ mod tests {
 
     #[test]
     fn intervals_that_touch_do_not_disagree() {
-        let say = |scored, left_out| calibration_disagrees(&scored, &left_out);
+        let say = |scored, left_out| calibration_disagrees(&scored, &left_out, false);
         assert_eq!(say(estimate(2.0, 0.5), estimate(1.25, 0.25)), None);
         let found = say(estimate(2.0, 0.5), estimate(1.0, 0.25))
             .unwrap()
@@ -123,6 +131,10 @@ mod tests {
             "{found}"
         );
         assert!(say(estimate(1.0, 0.25), estimate(2.0, 0.5)).is_some());
+        // Where the presses calibrated, smaller errors are expected; larger ones never.
+        let known = |scored, left_out| calibration_disagrees(&scored, &left_out, true);
+        assert_eq!(known(estimate(1.0, 0.25), estimate(2.0, 0.5)), None);
+        assert!(known(estimate(2.0, 0.5), estimate(1.0, 0.25)).is_some());
     }
 
     #[test]

@@ -62,6 +62,7 @@ pub mod rule;
 pub mod segment;
 mod session_base;
 pub mod sets;
+mod storms;
 mod stream;
 pub mod sums;
 pub mod tie;

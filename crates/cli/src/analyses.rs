@@ -175,6 +175,15 @@ pub(crate) fn all(session: &Path, session_id: &str) -> Vec<AnalysisFile> {
 /// [`Failure::input`] when no variant has that name.
 pub(crate) fn variant(session: &Path, session_id: &str, name: &str) -> Result<Variant, Failure> {
     let found = summary(session, session_id, Some(name)).map(|s| s.variant);
+    if let Err(why) = &found
+        && results_path(session, Some(name)).exists()
+    {
+        return Err(Failure::input(format!(
+            "{0}: expected an analysis named `{name}` of this session, found one that cannot be used: {why}\n  next: `skinrig show {0}` \
+             lists what it changes; `skinrig analyze {0} --set KEY=VALUE --name {name}` makes it again",
+            session.display()
+        )));
+    }
     found.ok().flatten().ok_or_else(|| {
         let others: Vec<String> = all(session, session_id).into_iter().filter_map(|a| a.name).collect();
         let there = if others.is_empty() { "none".to_owned() } else { others.join(", ") };

@@ -99,7 +99,7 @@ fn bound(bound: Option<f64>) -> String {
 fn refusal(unselected: &Unselected) -> String {
     match unselected {
         Unselected::Target(rmse) => format!(
-            "none: the most accurate has RMSE {} mm [{}, {}] on the {} presses that confirm",
+            "none: the first in rank has RMSE {} mm [{}, {}] (n {} that confirm), which ends the search",
             bound(rmse.value),
             bound(rmse.low),
             bound(rmse.high),

@@ -18,6 +18,22 @@ pub(crate) struct Locations {
     places: Places,
     /// Depths shared by all skins, µm.
     depths: BTreeSet<i64>,
+    /// Of several depths: where the errors of all skins can be compared.
+    cells: Option<Cells>,
+}
+
+/// Locations that all skins attempted, and at which depths each of them located a press there.
+#[derive(Debug, Clone, Default)]
+struct Cells {
+    locations: BTreeSet<u32>,
+    located: BTreeSet<(u32, i64)>,
+}
+
+impl Cells {
+    /// False for a press whose error would make its skin look worse because the other one did not locate its like.
+    fn hold(&self, location: u32, depth_um: i64) -> bool {
+        !self.locations.contains(&location) || self.located.contains(&(location, depth_um))
+    }
 }
 
 /// An attempted scored press.
@@ -28,21 +44,32 @@ pub(crate) struct Attempt<'a> {
     /// Presses with equal numbers are repetitions: same session, same depth.
     pub series: u32,
     pub press: &'a PressResult,
+    /// True if all skins located presses at this location and depth.
+    is_shared: bool,
     /// Session of the press.
     pub session: &'a Session,
 }
 
 impl Attempt<'_> {
-    /// Error vector in mm; `None` for a press that does not count.
+    /// Error vector in mm; `None` for a press that does not count, or at a location and depth where another skin has none.
     pub(crate) fn error(&self) -> Option<(f64, f64)> {
-        let valid = self.press.verdict == Verdict::Valid;
-        self.press.error_mm().filter(|_| valid)
+        own_error(self.press).filter(|_| self.is_shared)
     }
 
-    /// Error length in mm; `None` for a press that does not count.
+    /// Its length.
     pub(crate) fn error_mm(&self) -> Option<f64> {
         self.error().map(|(x, y)| libm::hypot(x, y))
     }
+
+    /// Error length in mm, whatever the other skins located; `None` for a press that does not count.
+    pub(crate) fn own_error_mm(&self) -> Option<f64> {
+        own_error(self.press).map(|(x, y)| libm::hypot(x, y))
+    }
+}
+
+fn own_error(press: &PressResult) -> Option<(f64, f64)> {
+    let valid = press.verdict == Verdict::Valid;
+    press.error_mm().filter(|_| valid)
 }
 
 impl Locations {
@@ -60,7 +87,28 @@ impl Locations {
                 shared.intersection(&of).copied().collect()
             });
         }
+        if locations.depths.len() > 1 {
+            locations.cells = locations.shared_cells(subjects);
+        }
         locations
+    }
+
+    fn shared_cells(&self, subjects: &[Subject]) -> Option<Cells> {
+        let of = |subject: &Subject| {
+            let mut own = Cells::default();
+            for attempt in self.attempts(subject) {
+                own.locations.insert(attempt.location);
+                if own_error(attempt.press).is_some() {
+                    let depth_um = micrometres(attempt.press.depth_mm);
+                    own.located.insert((attempt.location, depth_um));
+                }
+            }
+            own
+        };
+        subjects.iter().map(of).reduce(|a, b| Cells {
+            locations: a.locations.intersection(&b.locations).copied().collect(),
+            located: a.located.intersection(&b.located).copied().collect(),
+        })
     }
 
     /// Planned position of a location.
@@ -96,10 +144,14 @@ impl Locations {
             .flat_map(move |(i, session)| {
                 let presses = session.analysis.presses.iter().filter(|p| is_attempt(p));
                 presses.filter_map(move |press| {
+                    let location = self.places.find(press.planned)?;
+                    let depth_um = micrometres(press.depth_mm);
+                    let cells = self.cells.as_ref();
                     Some(Attempt {
-                        location: self.places.find(press.planned)?,
+                        location,
                         series: (i * depths + depth(press)?) as u32,
                         press,
+                        is_shared: cells.is_none_or(|cells| cells.hold(location, depth_um)),
                         session,
                     })
                 })

@@ -203,13 +203,12 @@ impl Metric {
                 Some((p.location, position))
             })),
             Self::LocatedRate => Ok(Sample::share(
-                attempts().map(|p| (p.location, p.error().is_some())),
+                attempts().map(|p| (p.location, p.own_error_mm().is_some())),
             )),
-            Self::WithinRate => {
-                Ok(Sample::share(attempts().map(|p| {
-                    (p.location, p.error_mm().is_some_and(|e| e <= within_mm))
-                })))
-            }
+            Self::WithinRate => Ok(Sample::share(attempts().map(|p| {
+                let error_mm = p.own_error_mm();
+                (p.location, error_mm.is_some_and(|e| e <= within_mm))
+            }))),
             Self::Latency => Sample::median(onsets(subject, locations)),
             Self::LatencyWidth => Sample::width(onsets(subject, locations)),
             Self::FalseAlarms => Sample::count_rate(alarms(subject, locations)),

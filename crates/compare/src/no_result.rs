@@ -9,6 +9,11 @@ pub enum NoResult {
     /// The values of a skin form no sample.
     #[error(transparent)]
     Sample(#[from] SampleFault),
+    /// A look at one session of a skin that has several.
+    #[error(
+        "only one session of a skin that has several, which does not tell how much sessions vary"
+    )]
+    OneSession,
     /// The samples have no interval, or cannot be compared.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),

@@ -41,9 +41,9 @@ pub struct Skin {
     pub sessions: Vec<SessionFacts>,
     /// Scored presses attempted at the depths that all skins share.
     pub attempted: u32,
-    /// Attempted presses that count.
+    /// Attempted presses that count, at locations and depths that all skins located.
     pub counted: u32,
-    /// Locations with an attempted press.
+    /// Locations with a press that counts.
     #[serde(rename = "places")]
     pub locations: u32,
 }
@@ -144,13 +144,14 @@ pub fn compare(
         .unwrap_or_default();
     let skin = |s: &Subject| {
         let attempts: Vec<_> = locations.attempts(s).collect();
-        let own: std::collections::BTreeSet<u32> = attempts.iter().map(|p| p.location).collect();
+        let counting = || attempts.iter().filter(|p| p.error().is_some());
+        let own: std::collections::BTreeSet<u32> = counting().map(|p| p.location).collect();
         Skin {
             letter: s.letter,
             name: s.name.clone(),
             sessions: s.sessions.iter().map(|s| s.facts.clone()).collect(),
             attempted: attempts.len() as u32,
-            counted: attempts.iter().filter(|p| p.error().is_some()).count() as u32,
+            counted: counting().count() as u32,
             locations: own.len() as u32,
         }
     };
@@ -181,7 +182,7 @@ pub fn compare(
         .map(|(i, other)| {
             let reanalysis = reanalyses.get(i).and_then(Option::as_ref);
             let reanalysis = reanalysis.map(|pair| match &result.sequential {
-                Some(s) => first_repetitions(pair, s.looks.len() as u32),
+                Some(s) => first_repetitions(pair, s.looks.last().map_or(0, |l| l.repetitions)),
                 None => pair.clone(),
             });
             let reanalysis = reanalysis.as_ref();

@@ -1,6 +1,6 @@
 //! Sequential comparison: after each repetition of both skins, whether the RMSE decides, with alpha spent over the looks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use skinrig_analysis::result::PressResult;
@@ -86,6 +86,18 @@ pub(crate) fn look(
             break;
         };
         spent += own.alpha;
+        if repetitions.iter().any(|r| !r.shows_sessions(number)) {
+            looks.push(Look {
+                repetitions: number,
+                presses: [0; 2],
+                alpha: own.alpha,
+                spent,
+                difference_mm: None,
+                verdict: None,
+                refused: Some(NoResult::OneSession),
+            });
+            continue;
+        }
         let chosen = first_repetitions(subjects, number);
         let locations = Locations::of(&chosen);
         let samples = chosen.each_ref().map(|s| {
@@ -139,6 +151,17 @@ struct Repetitions {
 }
 
 impl Repetitions {
+    /// False if the skin has several sessions but only one of them is among the first `number` repetitions, which do not tell how
+    /// much sessions vary.
+    fn shows_sessions(&self, number: u32) -> bool {
+        let sessions = |repetitions: &[(usize, RepetitionId)]| -> usize {
+            let all: BTreeSet<usize> = repetitions.iter().map(|r| r.0).collect();
+            all.len()
+        };
+        let first = &self.complete[..self.complete.len().min(number as usize)];
+        sessions(&self.complete) < 2 || sessions(first) > 1
+    }
+
     fn of(subject: &Subject) -> Self {
         let mut order: Vec<usize> = (0..subject.sessions.len()).collect();
         order.sort_by_key(|i| &subject.sessions[*i].facts.started);

@@ -1,12 +1,12 @@
 //! The choices of the public analysis code as overrides of a protocol's `analysis`.
 
 /// Overrides that select the public code's choices where it departs from the paper or from the defaults here: all
-/// clusters make the centroid, a press window is one whole period about the middle of the press, no threshold, response or
-/// angle excludes anything, data reduction has a core threshold of one event, the background is taken after the
-/// press, thresholds 17 to 19, and 3 to 8 at 1/1024 of the events. Each has its source in `docs/reference/paper.md`.
+/// clusters make the centroid, rays alone locate, a press window is one whole period about the middle of the press, no
+/// threshold, response or angle excludes anything, data reduction has a core threshold of one event, the background is
+/// taken after the press, thresholds 17 to 19, and 3 to 8 at 1/1024 of the events. Each has its source in `docs/reference/paper.md`.
 ///
 /// The calibration stays the protocol's: the block that judges as published fits the paper's eight parameters itself.
-pub const REFERENCE_CODE: [&str; 35] = [
+pub const REFERENCE_CODE: [&str; 36] = [
     "analysis.crop.camera1=[185 px, 360 px]",
     "analysis.crop.camera2=[200 px, 355 px]",
     "analysis.window_anchor=middle",
@@ -17,6 +17,7 @@ pub const REFERENCE_CODE: [&str; 35] = [
     "analysis.background_margin=0",
     "analysis.hot_pixel_ratio=0",
     "analysis.centroid=all_clusters",
+    "analysis.locator=geometry",
     "analysis.estimator=dbscan",
     "analysis.thinning=1",
     "analysis.bin=1 px",

@@ -186,14 +186,14 @@ pub fn disagreement(analysis: &Analysis) -> Option<String> {
     })
 }
 
-/// The error where no press calibrated, if the headline presses are at places that calibrated.
+/// The error where no press calibrated, if a press of the headline is at a place that calibrated.
 #[must_use]
 pub(crate) fn rmse_elsewhere(analysis: &Analysis) -> Option<String> {
     if !analysis.scores_calibrating_places()? {
         return None;
     }
     let rmse = analysis.left_out_rmse()?;
-    let (value, interval) = (number(rmse.value, 2), interval(rmse, 1.0, 2));
+    let (value, interval) = (number(rmse.value, 2), interval(&rmse, 1.0, 2));
     Some(format!(
         "{value} mm {interval} where no press calibrated, n {} presses",
         rmse.n

@@ -77,7 +77,7 @@ impl Summary {
                 .collect(),
             counts: analysis.counts,
             rmse_mm: scored.rmse_mm,
-            left_out_rmse_mm: analysis.left_out_rmse().copied(),
+            left_out_rmse_mm: analysis.left_out_rmse(),
             repeat_std_mm: scored.repeat_std_mm,
             located_rate: scored.located_rate,
         }

@@ -51,8 +51,8 @@ pub(crate) const FOOTNOTES: [Footnote; 7] = [
     },
     Footnote {
         mark: "f",
-        text: "The pass threshold is the 95th percentile of the errors at factor 1, so the rate at factor 1 is 95 % \
-               by construction.",
+        text: "The pass threshold is the 95th percentile of the errors at factor 1, so the rate at factor 1 is about \
+               95 % by construction, and less where presses have no estimate.",
     },
     Footnote {
         mark: "g",

@@ -1,11 +1,13 @@
 //! Sessions without data, and corrupted or contradictory ones.
 
 use proptest::prelude::*;
-use skinrig_analysis::result::{LocationOutcome, WarningCause};
-use skinrig_analysis::{AnalysisError, EventSource, EventSourceError, SessionInput, analyze};
+use skinrig_analysis::result::{LocationOutcome, Warning, WarningCause};
+use skinrig_analysis::{
+    Analysis, AnalysisError, EventSource, EventSourceError, SessionInput, analyze,
+};
 use skinrig_model::{
-    CalibrationModel, CameraId, CdEvent, ExcludedReason, MissedReason, Point2, Polarity, PressRole,
-    PressVerdict, Verdict,
+    CalibrationModel, CameraId, CdEvent, ExcludedReason, MissedReason, Point2, Polarity, PressId,
+    PressRole, PressVerdict, Verdict,
 };
 
 use skinrig_planted::Memory;
@@ -70,6 +72,73 @@ fn a_million_events_on_one_pixel_are_counted() {
     let view = a.presses[30].views[0].unwrap();
     assert!(view.events > 1_000_500 && view.cluster_events >= 1_000_000);
     assert!((view.centroid_u.unwrap() - 3.0).abs() < 0.01);
+    // The position is that of the pixel: a warning names the press.
+    let storms = |a: &Analysis| -> Vec<(Option<CameraId>, Vec<PressId>)> {
+        let of = |w: &Warning| match &w.cause {
+            WarningCause::EventStorms { presses, .. } => Some((w.camera, presses.clone())),
+            _ => None,
+        };
+        a.warnings.iter().filter_map(of).collect()
+    };
+    assert_eq!(
+        storms(&a),
+        [(Some(CameraId::One), vec![PressId::from_index(30)])]
+    );
+
+    // Ten times the events of a press, and not of its repetitions or of two presses in five.
+    let (_, mut source) = session();
+    let in_press = |k: usize, e: &CdEvent| {
+        let from = camera_us(1, plan()[k].4);
+        (from..from + 5e5).contains(&(e.t_us as f64))
+    };
+    let copies = |events: &[CdEvent], presses: &[usize]| -> Vec<CdEvent> {
+        let times = |e: &CdEvent| {
+            if presses.iter().any(|k| in_press(*k, e)) {
+                10
+            } else {
+                1
+            }
+        };
+        let all = events
+            .iter()
+            .flat_map(|e| std::iter::repeat_n(*e, times(e)));
+        all.collect()
+    };
+    let sound = source.events[1].clone();
+    assert_eq!(storms(&analyze(&input, &source).unwrap()), []);
+    source.events[1] = copies(&sound, &[12]);
+    let found = storms(&analyze(&input, &source).unwrap());
+    assert_eq!(
+        found,
+        [(Some(CameraId::Two), vec![PressId::from_index(12)])]
+    );
+    let many: Vec<usize> = (0..50).filter(|k| k % 5 < 2).collect();
+    source.events[1] = copies(&sound, &many);
+    assert_eq!(storms(&analyze(&input, &source).unwrap()), []);
+}
+
+#[test]
+fn a_recording_that_holds_each_event_twice_is_named() {
+    let (input, mut source) = session();
+    let repeated = |a: &Analysis| -> Vec<(Option<CameraId>, u64)> {
+        let of = |w: &Warning| match w.cause {
+            WarningCause::EventsRepeated { repeated, .. } => Some((w.camera, repeated)),
+            _ => None,
+        };
+        a.warnings.iter().filter_map(of).collect()
+    };
+    assert_eq!(repeated(&analyze(&input, &source).unwrap()), []);
+    let twice = source.events[1].iter().flat_map(|e| [*e, *e]).collect();
+    let once = std::mem::replace(&mut source.events[1], twice);
+    let found = repeated(&analyze(&input, &source).unwrap());
+    let [(Some(CameraId::Two), n)] = found[..] else {
+        panic!("{found:?}");
+    };
+    // At the borders of slices nothing is compared.
+    assert!(
+        n <= once.len() as u64 && n > once.len() as u64 * 99 / 100,
+        "{n}"
+    );
 }
 
 #[test]

@@ -41,9 +41,7 @@ const FIGURES: [Figure; 9] = [
     ("RMSE", |a| Some(a.scored.rmse_mm)),
     ("RMSE x", |a| Some(a.scored.rmse_x_mm)),
     ("median error", |a| Some(a.scored.median_mm)),
-    ("RMSE where no press calibrated", |a| {
-        a.left_out_rmse().copied()
-    }),
+    ("RMSE where no press calibrated", |a| a.left_out_rmse()),
     ("events/s in presses", |a| {
         Some(a.bit_rates.as_ref()?.press_events_per_s)
     }),

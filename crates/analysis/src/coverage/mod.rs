@@ -13,7 +13,7 @@ use skinrig_model::{CameraModel, Point2, PressRole, Verdict};
 
 pub use cells::{neighbour_distance_mm, probed_area_mm2};
 
-use crate::result::{Analysis, Coverage, Estimate};
+use crate::result::{Analysis, Coverage, Estimate, PressResult};
 
 /// Segments per arc of the outline for computing areas.
 pub const ARC_SEGMENTS: u32 = 256;
@@ -24,7 +24,8 @@ const BORDER_COLUMNS: [f64; 2] = [0.0, skinrig_model::SENSOR_WIDTH as f64];
 
 /// Areas and taxels of an analysed session; `None` if a camera has no direction (it is at the point it aims at).
 ///
-/// Probed locations are those of attempted calibration and scored presses that neither the journal nor an operator excludes.
+/// The probed area is that of the locations whose scored presses are in the RMSE: each a cell as large as the distance between
+/// neighbours among all pressed locations, those of calibration presses and of failed ones too.
 #[must_use]
 pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
     let outline = &analysis.rig.outline;
@@ -40,10 +41,13 @@ pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
     };
     let (_, exact) = fields_of_view(ARC_SEGMENTS)?;
     let (views, overlap) = fields_of_view(DRAWN_ARC_SEGMENTS)?;
-    let (places, locations) = probed_places(analysis);
-    let cell_mm = neighbour_distance_mm(&places);
+    let (pressed, _) = distinct_places(analysis, is_used);
+    let cell_mm = neighbour_distance_mm(&pressed);
+    let (places, locations) = distinct_places(analysis, is_in_rmse);
     let skin_mm2 = outline.area_mm2();
-    let probed_mm2 = cell_mm.map(|side| probed_area_mm2(outline, &places, side));
+    let probed_mm2 = cell_mm
+        .filter(|_| !places.is_empty())
+        .map(|side| probed_area_mm2(outline, &places, side));
     let rmse_mm = analysis.scored.rmse_mm;
     Some(Coverage {
         skin_mm2,
@@ -111,12 +115,20 @@ pub fn taxels(area_mm2: Option<f64>, rmse_mm: &Estimate) -> Estimate {
     }
 }
 
-/// Distinct planned positions of attempted presses that are used, and the number of their locations.
-fn probed_places(analysis: &Analysis) -> (Vec<Point2>, u32) {
-    let probed = analysis.presses.iter().filter(|p| {
-        let used = p.verdict != Verdict::Excluded || p.rule().is_some_and(|rule| rule.is_on_data());
-        p.role != PressRole::Sync && p.verdict != Verdict::Missed && used
-    });
+/// True for a press that was made and that neither the journal nor an operator excludes.
+fn is_used(p: &PressResult) -> bool {
+    let used = p.verdict != Verdict::Excluded || p.rule().is_some_and(|rule| rule.is_on_data());
+    p.role != PressRole::Sync && p.verdict != Verdict::Missed && used
+}
+
+/// True for a press of the headline.
+fn is_in_rmse(p: &PressResult) -> bool {
+    p.role == PressRole::Score && p.verdict == Verdict::Valid && p.error_mm().is_some()
+}
+
+/// Distinct planned positions of some presses, and the number of their locations.
+fn distinct_places(analysis: &Analysis, of: fn(&PressResult) -> bool) -> (Vec<Point2>, u32) {
+    let probed = analysis.presses.iter().filter(|p| of(p));
     let mut locations: Vec<(u32, Point2)> =
         probed.map(|p| (p.location.index(), p.planned)).collect();
     locations.sort_by_key(|l| l.0);

@@ -221,6 +221,11 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "camera 1: 5 events have timestamps days away from all others and are not in the event rates",
         ),
         (
+            json!({"camera": "camera1", "kind": "events_repeated", "repeated": 500, "events": 1000}),
+            "camera 1: 500 of 1000 events equal the one before them (pixel, time, polarity): the recording holds events twice, \
+             and event rates are too high; convert the camera's file again",
+        ),
+        (
             json!({"camera": "camera1", "kind": "events_off_sensor", "events": 5, "of": 1000}),
             "camera 1: 5 of 1000 events are outside the sensor and ignored: the recording may be damaged, or from \
              another sensor",
@@ -357,6 +362,11 @@ fn of_results() -> Vec<(Value, &'static str)> {
                     "text": "the calibration locations lie on a line or a curve; spread them over the skin"}}),
             "the locator `direct` cannot learn: the calibration locations lie on a line or a curve; spread them over the \
              skin; using `geometry`",
+        ),
+        (
+            json!({"camera": "camera2", "kind": "event_storms", "presses": [4, 20], "times": 21.4}),
+            "camera 2: event storm in press 4, press 20: up to 21 times the events of other presses at that depth, which hide the \
+             touch; find what flickers, leave the press out with `skinrig select`, and set `suspend.event_rate` in the protocol",
         ),
         (
             json!({"kind": "calibration_disagrees", "scored_rmse_mm": estimate(3.0), "held_out_rmse_mm": estimate(1.0)}),

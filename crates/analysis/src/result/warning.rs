@@ -198,6 +198,17 @@ pub enum WarningCause {
         /// Events.
         events: u64,
     },
+    /// Events that equal the one before.
+    #[error(
+        "{repeated} of {events} events equal the one before them (pixel, time, polarity): the recording holds events twice, and event \
+         rates are too high; convert the camera's file again"
+    )]
+    EventsRepeated {
+        /// Repeated events.
+        repeated: u64,
+        /// All events.
+        events: u64,
+    },
     /// Events outside the sensor.
     #[error(
         "{events} of {of} events are outside the sensor and ignored: the recording may be damaged, or from another sensor"
@@ -497,6 +508,18 @@ pub enum WarningCause {
         scored_rmse_mm: Estimate,
         /// RMSE at held-out calibration locations, mm.
         held_out_rmse_mm: Estimate,
+    },
+    /// Presses with far more events than others.
+    #[error(
+        "event storm in {}: up to {times:.0} times the events of other presses at that depth, which hide the touch; find what flickers, \
+         leave the press out with `skinrig select`, and set `suspend.event_rate` in the protocol",
+        .presses.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    )]
+    EventStorms {
+        /// The presses.
+        presses: Vec<PressId>,
+        /// Most events, relative to the busiest tenth of the other presses.
+        times: f64,
     },
     /// Fewer events locate better than all.
     #[error(

@@ -163,7 +163,7 @@ fn sides_of_two_skins_and_of_other_depth_shares_and_planted_faults_are_refused()
     skinrig(&select).code(0);
     skinrig(&["compare", &a, &easy]).code(2).expect_stderr(&[
         "presses by location",
-        "1 to 2 presses at a location",
+        "1 to 2 presses at each of 4 locations",
         "--despite location-shares",
     ]);
 

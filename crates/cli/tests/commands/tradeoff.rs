@@ -175,7 +175,7 @@ fn an_unmet_demand_exits_with_code_4_and_tables_fit_the_terminal() {
     );
     assert!(output.out.contains("streaming f32"), "{}", output.out);
     // The answer comes before the table.
-    let answer = output.out.find("none: the most accurate has RMSE").unwrap();
+    let answer = output.out.find("none: the first in rank has RMSE").unwrap();
     assert!(answer < output.out.find("choices tried on").unwrap());
     let budget = ["tradeoff", &session, "--repeats", "1", "--budget", "10s"];
     let met = skinrig(&budget).code(0).out;

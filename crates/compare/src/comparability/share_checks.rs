@@ -114,7 +114,12 @@ fn at_locations(subjects: &[Subject], locations: &Locations) -> Option<Differenc
         let ends = counts.values().min().zip(counts.values().max());
         ends.map_or_else(
             || "none".to_owned(),
-            |(fewest, most)| format!("{fewest} to {most} presses at a location"),
+            |(fewest, most)| {
+                format!(
+                    "{fewest} to {most} presses at each of {} locations",
+                    counts.len()
+                )
+            },
         )
     };
     let reason =

@@ -1,7 +1,8 @@
 //! Skins with one and with several sessions.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-use skinrig_compare::{Comparison, ComparisonOptions, Subject, compare};
+use skinrig_compare::{Comparison, ComparisonOptions, NoResult, Subject, compare};
+use skinrig_statistics::AlphaSpending;
 
 use crate::causes::planted::{PlantedCause, record};
 
@@ -48,4 +49,36 @@ fn sessions_of_each_skin_are_told_apart() {
         assert!(found.len() > 5, "{found:?}");
         assert!(found.iter().all(|s| *s == Some(expected)), "{found:?}");
     }
+}
+
+/// One session of a skin does not tell how much sessions vary.
+#[test]
+fn looks_begin_with_the_second_session() {
+    let [one, two, three, four] =
+        [1, 2, 3, 4].map(|seed| record(seed, PlantedCause::Nothing).skin('A', None));
+    let options = ComparisonOptions {
+        sequential: Some(AlphaSpending {
+            planned_looks: None,
+        }),
+        ..ComparisonOptions::default()
+    };
+    let looked = |a: &[&Subject], b: &[&Subject]| {
+        let found = compare(&[skin('A', a), skin('B', b)], &vec![None], &options);
+        let looks = found.sequential.unwrap().looks;
+        let taken: Vec<u32> = looks
+            .iter()
+            .filter(|look| look.refused.is_none())
+            .map(|look| look.repetitions)
+            .collect();
+        (taken, looks)
+    };
+    // Two scored repetitions a session.
+    let (taken, looks) = looked(&[&one, &two], &[&three, &four]);
+    assert_eq!(taken.first(), Some(&3), "{looks:#?}");
+    assert_eq!(looks[0].refused, Some(NoResult::OneSession));
+    assert_eq!(looks[0].verdict, None);
+    let (taken, looks) = looked(&[&one], &[&three, &four]);
+    assert_eq!(taken, [0; 0], "{looks:#?}");
+    let (taken, looks) = looked(&[&one], &[&three]);
+    assert_eq!(taken.first(), Some(&1), "{looks:#?}");
 }

@@ -255,6 +255,50 @@ fn a_location_without_a_shared_depth_is_not_on_the_map() {
     assert_eq!(attempted, [48, 48]);
 }
 
+/// A skin that locates none of its faint presses does not look better for it.
+#[test]
+fn depths_that_one_skin_did_not_locate_are_not_compared() {
+    let [mut a, mut b] = [1, 2].map(|seed| record(seed, PlantedCause::Nothing).skin('A', None));
+    let first = scored(&a).next().unwrap();
+    let (kept, faint) = (first.location, first.repetition);
+    for (skin, is_dull) in [(&mut a, false), (&mut b, true)] {
+        let presses = skin.sessions[0].analysis.presses.iter_mut();
+        for press in presses.filter(|p| p.role == PressRole::Score && p.repetition == faint) {
+            press.depth_mm = 0.5;
+            if is_dull && press.location != kept {
+                let mut json = serde_json::to_value(&*press).unwrap();
+                json["verdict"] = "excluded".into();
+                json["cause"] = serde_json::json!({"no_cluster": {"camera": "camera1"}});
+                *press = serde_json::from_value(json).unwrap();
+            }
+        }
+    }
+    let square = |p: &PressResult| {
+        let (x, y) = p.error_mm().unwrap();
+        x * x + y * y
+    };
+    let of = |skin: &Subject, all: bool| {
+        let shared = |p: &&PressResult| all || p.depth_mm != 0.5 || p.location == kept;
+        mean(scored(skin).filter(shared).map(square)).sqrt()
+    };
+    let found = compared(&a, &b);
+    let rmse = row(&found, Metric::Rmse).against_first[0]
+        .comparison
+        .as_ref();
+    let rmse = rmse.unwrap();
+    assert!(is_near(rmse.a.value, of(&a, false)), "{rmse:#?}");
+    assert!((of(&a, true) - of(&a, false)).abs() > 1e-6);
+    assert!(is_near(rmse.b.value, of(&b, false)), "{rmse:#?}");
+    // What it did not locate shows in its rate.
+    let located = row(&found, Metric::LocatedRate);
+    let rates: Vec<f64> = located
+        .values
+        .iter()
+        .map(|v| v.value.as_ref().unwrap().value)
+        .collect();
+    assert!(is_near(rates[0], 1.0) && rates[1] < 0.6, "{rates:?}");
+}
+
 #[test]
 fn looks_spend_alpha_and_an_overridden_rig_keeps_the_locations_paired() {
     let (a, mut b) = (

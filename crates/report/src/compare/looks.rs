@@ -33,8 +33,8 @@ pub(super) fn conclusion(of: &SequentialComparison, letter: char) -> String {
                 "a look needs a complete scored repetition of both, found {a} of A and {b} of {letter}"
             )
         }
-        _ if of.looks.last().is_some_and(|look| look.refused.is_some()) => {
-            "the last look allows no comparison, for the reason above".to_owned()
+        _ if let Some(why) = of.looks.last().and_then(|look| look.refused.as_ref()) => {
+            format!("the last look allows no comparison: {why}")
         }
         Outlook::More { repetitions } => format!(
             "about {} expected if the measured difference is real",

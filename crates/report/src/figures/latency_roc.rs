@@ -23,9 +23,13 @@ pub(crate) fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
     let choice = chosen.map_or_else(
         || "No threshold detects anything.".to_owned(),
         |r| {
+            let why = if 100.0 * r.detected_rate >= target {
+                "with the fewest false alarms among those that detect at least"
+            } else {
+                "which detects most, because none detects"
+            };
             format!(
-                "Ring: the chosen threshold (h = {}), with the fewest false alarms among those that detect at least {} \
-                 % (dashed).",
+                "Ring: the chosen threshold (h = {}), {why} {} % (dashed).",
                 number(Some(r.threshold), 2),
                 number(Some(target), 0)
             )

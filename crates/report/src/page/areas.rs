@@ -151,9 +151,21 @@ pub(super) fn bit_rates(a: &Analysis) -> Option<Table> {
         let own = estimate(name, e, scale, digits);
         own.into_iter().chain([theirs.to_owned()])
     };
-    grid.row(row("press (kev/s)", &r.press_events_per_s, 1e-3, 2, "28.6"));
+    grid.row(row(
+        "press window (kev/s)",
+        &r.press_events_per_s,
+        1e-3,
+        2,
+        "28.6",
+    ));
     grid.row(row("idle (kev/s)", &r.idle_events_per_s, 1e-3, 2, "9.1"));
-    grid.row(row("press (kB/s)", &r.press_bytes_per_s, 1e-3, 2, "~75"));
+    grid.row(row(
+        "press window (kB/s)",
+        &r.press_bytes_per_s,
+        1e-3,
+        2,
+        "~75",
+    ));
     grid.row(row("idle (kB/s)", &r.idle_bytes_per_s, 1e-3, 2, "~24"));
     grid.row(row(
         "press, contact to release (s)",
@@ -163,8 +175,9 @@ pub(super) fn bit_rates(a: &Analysis) -> Option<Table> {
         "0.55",
     ));
     grid.note(format!(
-        "Events in the rows of the crop; bytes at {} bits per event. The published event rates are derived from the \
-         published bytes at 21 bits.",
+        "Events in the rows of the crop; bytes at {} bits per event. The press window begins before the contact and ends \
+         after the release (`analysis.window_before`, `window_after`), so its rates are below those between the two. The \
+         published event rates are derived from the published bytes at 21 bits.",
         number(Some(r.bits_per_event), 0)
     ));
     grid.download("bit_rates");

@@ -47,8 +47,8 @@ fn scene(input: &ReportInput<'_>) -> Option<Note> {
         Err(e) => Note::new("Scene.", e.to_string()).bad(),
         Ok(found) => {
             let head = Text::from(format!(
-                "Simulated as {}: {}.",
-                found.scene_in_words(),
+                "{}: {}.",
+                capitalised(&found.scene_in_words()),
                 found.verdict()
             ));
             let differing = found.differing();

@@ -55,7 +55,7 @@ impl ScenePrediction {
         if self.changed.is_empty() {
             return self.scene.clone();
         }
-        format!("{} ({})", self.scene, self.changed.join(", "))
+        format!("{}, {}", self.scene, self.changed.join(", "))
     }
 
     /// The answer in one sentence.

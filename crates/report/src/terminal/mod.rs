@@ -198,9 +198,17 @@ fn scored(input: &ReportInput<'_>) -> Section {
         ])
     };
     let mut table = Table::of("scored", "Scored presses", columns);
+    // The RMSE of a campaign that ends by itself has the level of its look.
+    let level = derive::rmse_at_look(a).map_or_else(String::new, |at| format!(" {} %", at.level));
     for r in metric_rows(a) {
-        let style = (r.key == "rmse").then_some(Style::Bold);
-        let row = row(r.name, r.value, r.unit, r.interval, r.n, r.what_n);
+        let is_rmse = r.key == "rmse";
+        let style = is_rmse.then_some(Style::Bold);
+        let interval = if is_rmse {
+            r.interval + &level
+        } else {
+            r.interval
+        };
+        let row = row(r.name, r.value, r.unit, interval, r.n, r.what_n);
         table.add(row.style(style));
     }
     if !a.is_valid() {
@@ -208,7 +216,7 @@ fn scored(input: &ReportInput<'_>) -> Section {
     }
     let rmse = &a.scored.rmse_mm;
     if let Some(share) = a.scored.rmse_diagonal_percent {
-        let interval = interval(rmse, 100.0 / a.rig.outline.diagonal_mm(), 2);
+        let interval = interval(rmse, 100.0 / a.rig.outline.diagonal_mm(), 2) + &level;
         let (name, value) = ("RMSE, share of diagonal", number(Some(share), 2));
         table.add(row(
             name.to_owned(),

@@ -103,7 +103,7 @@ fn areas(a: &Analysis) -> Vec<Note> {
 fn rates(a: &Analysis) -> Option<Note> {
     let r = a.bit_rates.as_ref()?;
     let text = format!(
-        "press {} kB/s, idle {} kB/s at {} bits per event, n {}",
+        "press window {} kB/s, idle {} kB/s at {} bits per event, n {}",
         with(&r.press_bytes_per_s, 1e-3, 1),
         with(&r.idle_bytes_per_s, 1e-3, 1),
         r.bits_per_event,
