@@ -116,8 +116,11 @@ fn print_recommendation(
     predictions: &Predictions,
 ) {
     outln!("{}:", recommendation.question);
-    let (row, rmse, prediction) = match &recommendation.found {
-        Ok(found) => (found.row, &found.confirmed_mm, predictions.get(found.index)),
+    let (row, rmse, prediction, ranked_by) = match &recommendation.found {
+        Ok(found) => {
+            let prediction = predictions.get(found.index);
+            (found.row, &found.confirmed_mm, prediction, found.ranked_by)
+        }
         Err(unselected) => {
             outln!("  {}\n", refusal(unselected));
             return;
@@ -131,7 +134,7 @@ fn print_recommendation(
     let paint = Paint::new(crate::terminal::is_coloured(&std::io::stdout()));
     let chosen = format!("{name}: RMSE {} mm", bound(rmse.value));
     outln!(
-        "  {}, 95 % interval [{}, {}], n {} that did not choose;\n  {:.3} ms of CPU time per press, {} pixels",
+        "  {}, 95 % interval [{}, {}], n {} that did not choose ({ranked_by} locations did);\n  {:.3} ms of CPU time per press, {} pixels",
         paint.bold(&chosen),
         bound(rmse.low),
         bound(rmse.high),
@@ -300,6 +303,7 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
             "choice": row.map(|r| label(&r.choice)),
             "row": row,
             "confirmed_mm": found.map(|f| f.confirmed_mm),
+            "ranking_locations": found.map(|f| f.ranked_by),
             "protocol": row.map(|row| lines_on_top(row, own.as_deref())),
         })
     });

@@ -52,6 +52,8 @@ pub struct Selection<'a> {
     pub index: usize,
     /// RMSE on the presses that did not rank the choices.
     pub confirmed_mm: Estimate,
+    /// Locations that ranked the choices.
+    pub ranked_by: usize,
 }
 
 /// Why no choice is selected.
@@ -87,6 +89,7 @@ impl Measured {
                 row: &self.tradeoff.rows[row],
                 index: row,
                 confirmed_mm,
+                ranked_by: ranking.len(),
             });
             let Requirement::Target(mm, _) = requirement else {
                 return selection;

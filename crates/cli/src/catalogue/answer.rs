@@ -31,15 +31,15 @@ pub(super) fn query(args: &QueryArgs, json: bool) -> Outcome {
         );
     }
     if json {
-        crate::terminal::print_json(&document(&answer));
+        crate::terminal::print_json(&document(&answer, stale));
     } else {
         print_answer(&answer);
     }
     Ok(Exit::Ok)
 }
 
-/// Rows as objects.
-fn document(answer: &Answer) -> serde_json::Value {
+/// Rows as objects, and how many sessions of the folder are not in the catalogue as they are.
+fn document(answer: &Answer, stale: usize) -> serde_json::Value {
     let row = |row: &Vec<Value>| {
         let cells = answer.columns.iter().cloned().zip(row);
         let cells = cells.map(|(name, value)| (name, serde_json::json!(value)));
@@ -51,6 +51,7 @@ fn document(answer: &Answer) -> serde_json::Value {
         "question": answer.question,
         "parameters": serde_json::Value::Object(parameters.collect()),
         "rows": answer.rows.iter().map(row).collect::<Vec<_>>(),
+        "stale_sessions": stale,
     })
 }
 

@@ -54,7 +54,7 @@ pub(super) fn predict(args: &ScenePredictArgs, command_line: &str, output: Outpu
         figures: Vec::new(),
     };
     let mut replicates = Vec::new();
-    for (done, seed) in (1..).zip(simulations.seeds.clone()) {
+    for (done, seed) in (1..).zip(simulations.seeds.iter().copied()) {
         match simulations.one(seed)? {
             Ok(replicate) => {
                 found.scene = replicate.header.rig_name;
@@ -153,7 +153,7 @@ struct Simulations<'a> {
     /// Overrides that the session does not have.
     changed: Vec<String>,
     level: Option<String>,
-    seeds: std::ops::Range<u64>,
+    seeds: Vec<u64>,
     command_line: &'a str,
 }
 
@@ -195,6 +195,7 @@ impl<'a> Simulations<'a> {
             seeds: seeds(
                 args.seed.unwrap_or(header.seed.wrapping_add(1)),
                 args.replicates,
+                header.seed,
             )?,
             command_line,
         })
@@ -223,13 +224,15 @@ impl<'a> Simulations<'a> {
     }
 }
 
-/// Seeds from `first` on.
-fn seeds(first: u64, n: u32) -> Result<std::ops::Range<u64>, Failure> {
-    let end = first.checked_add(u64::from(n)).ok_or_else(|| {
-        Failure::input(format!(
-            "--seed: expected at most {}, found {first}",
-            u64::MAX - u64::from(n)
-        ))
-    })?;
-    Ok(first..end)
+/// So many seeds from `first` on, without that of the session: it would be simulated again.
+fn seeds(first: u64, n: u32, own: u64) -> Result<Vec<u64>, Failure> {
+    let seeds = (first..=u64::MAX).filter(|seed| *seed != own);
+    let seeds: Vec<u64> = seeds.take(n as usize).collect();
+    if seeds.len() < n as usize {
+        return Err(Failure::input(format!(
+            "--seed: expected {n} further seeds, found {first}, which has {} to the largest",
+            seeds.len()
+        )));
+    }
+    Ok(seeds)
 }
