@@ -12,12 +12,10 @@ use skinrig_model::{CameraId, LocationId, Locator, Point2, PressId, PressRole, V
 
 use crate::format::{grouped, interval, number};
 
-/// True for the presses behind the headline: scored, valid, with truth and estimate.
+/// True for the presses behind the headline, if their error is finite.
 #[must_use]
 pub(crate) fn is_counted(press: &PressResult) -> bool {
-    press.role == PressRole::Score
-        && press.verdict == Verdict::Valid
-        && error_norm_mm(press).is_some()
+    press.is_in_headline() && error_norm_mm(press).is_some()
 }
 
 /// Euclidean length of the error vector, mm; `None` without truth or estimate, or if not finite.

@@ -43,7 +43,7 @@ pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
     let (views, overlap) = fields_of_view(DRAWN_ARC_SEGMENTS)?;
     let (pressed, _) = distinct_places(analysis, is_used);
     let cell_mm = neighbour_distance_mm(&pressed);
-    let (places, locations) = distinct_places(analysis, is_in_rmse);
+    let (places, locations) = distinct_places(analysis, PressResult::is_in_headline);
     let skin_mm2 = outline.area_mm2();
     let probed_mm2 = cell_mm
         .filter(|_| !places.is_empty())
@@ -119,11 +119,6 @@ pub fn taxels(area_mm2: Option<f64>, rmse_mm: &Estimate) -> Estimate {
 fn is_used(p: &PressResult) -> bool {
     let used = p.verdict != Verdict::Excluded || p.rule().is_some_and(|rule| rule.is_on_data());
     p.role != PressRole::Sync && p.verdict != Verdict::Missed && used
-}
-
-/// True for a press of the headline.
-fn is_in_rmse(p: &PressResult) -> bool {
-    p.role == PressRole::Score && p.verdict == Verdict::Valid && p.error_mm().is_some()
 }
 
 /// Distinct planned positions of some presses, and the number of their locations.

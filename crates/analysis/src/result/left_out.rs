@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_model::{LocationId, PressRole, Verdict};
+use skinrig_model::{LocationId, PressRole};
 
 use super::{Analysis, Estimate, PressResult};
 use crate::over_locations::rms_over_locations;
@@ -69,10 +69,7 @@ impl Analysis {
         calibrating.map(|p| p.location).collect()
     }
 
-    /// The presses of the headline.
     fn counted(&self) -> impl Iterator<Item = &PressResult> {
-        self.presses.iter().filter(|p| {
-            p.role == PressRole::Score && p.verdict == Verdict::Valid && p.error_mm().is_some()
-        })
+        self.presses.iter().filter(|p| p.is_in_headline())
     }
 }

@@ -413,6 +413,13 @@ impl PressResult {
         let (e, t) = (self.estimate()?, self.truth?);
         Some((e.x_mm - t.x_mm, e.y_mm - t.y_mm))
     }
+
+    /// True for a press of the headline: scored, valid, with truth and estimate.
+    #[must_use]
+    pub fn is_in_headline(&self) -> bool {
+        let is_scored = self.role == PressRole::Score && self.verdict == Verdict::Valid;
+        is_scored && self.error_mm().is_some()
+    }
 }
 
 /// Pixels of the crop that fire in idle time again and again, and no more during presses. Their events do not count.

@@ -8,7 +8,7 @@ use skinrig_model::{Reaction, Verdict};
 use super::calibration_checks::calibrating;
 use super::camera_checks::{ambient, cameras, ray_geometry};
 use super::difference::{Difference, Severity, as_blocking, difference};
-use super::share_checks::shares;
+use super::share_checks::{located_depths, shares};
 use crate::locations::Locations;
 use crate::subject::{Session, Subject, join_values};
 
@@ -23,6 +23,7 @@ pub(super) fn all(subjects: &[Subject], locations: &Locations) -> Vec<Difference
     found.extend(check_stopped(subjects));
     found.extend(calibrating(subjects));
     found.extend(check_locations(subjects, locations));
+    found.extend(located_depths(subjects, locations));
     found.extend(check_duplicates(subjects));
     found.extend(check_seeds(subjects));
     found.extend(check_mounting(subjects));

@@ -17,6 +17,31 @@ pub(super) fn shares(subjects: &[Subject], locations: &Locations) -> Option<Diff
     depths(subjects, locations).or_else(|| at_locations(subjects, locations))
 }
 
+/// Presses whose error does not count because another skin located none at that location and depth.
+pub(super) fn located_depths(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
+    let counts = |s: &Subject| {
+        let attempts: Vec<_> = locations.attempts(s).collect();
+        let located = attempts.iter().filter(|p| p.own_error_mm().is_some());
+        let compared = attempts.iter().filter(|p| p.error().is_some());
+        (compared.count(), located.count())
+    };
+    let counts: Vec<(usize, usize)> = subjects.iter().map(counts).collect();
+    if counts.iter().all(|(compared, located)| compared == located) {
+        return None;
+    }
+    let values = counts
+        .iter()
+        .map(|(compared, located)| format!("{compared} of {located} located presses"));
+    let reason = "at each location only depths that all skins located are compared; the located rate has the rest";
+    Some(difference(
+        "located-depths",
+        "depths that were located",
+        Severity::Harmless,
+        values.collect(),
+        reason,
+    ))
+}
+
 fn of<'a, K: Ord>(
     attempts: impl Iterator<Item = Attempt<'a>>,
     key: impl Fn(&Attempt<'a>) -> K,

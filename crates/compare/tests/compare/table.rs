@@ -289,6 +289,8 @@ fn depths_that_one_skin_did_not_locate_are_not_compared() {
     assert!(is_near(rmse.a.value, of(&a, false)), "{rmse:#?}");
     assert!((of(&a, true) - of(&a, false)).abs() > 1e-6);
     assert!(is_near(rmse.b.value, of(&b, false)), "{rmse:#?}");
+    let told = found.differences.iter().find(|d| d.key == "located-depths");
+    assert_eq!(told.unwrap().values[0], "26 of 50 located presses");
     // What it did not locate shows in its rate.
     let located = row(&found, Metric::LocatedRate);
     let rates: Vec<f64> = located

@@ -19,7 +19,8 @@ pub(super) fn notices(input: &ReportInput<'_>) -> Group {
         let text = "The plausibility audit found no violation in the laws it could test.";
         Note::of(text).good().test_id("audit-silent")
     });
-    let is_quiet = troubles.is_empty();
+    let is_quiet =
+        troubles.is_empty() && !matches!(input.scene, Some(Ok(s)) if !s.differing().is_empty());
     let quiet =
         is_quiet.then(|| Note::of("No warnings, faults, interruptions or lost data.").good());
     let off_sensor = derive::off_sensor(a).into_iter();
