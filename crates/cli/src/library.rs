@@ -201,7 +201,7 @@ pub fn simulate(simulation: Simulation, control: ControlHandle) -> Result<PathBu
     };
     if checked.plan.stop.is_some() {
         return Err(Failure::input(
-            "expected a protocol without `stop`, found one: other programs cannot take its looks\n  next: use `skinrig run`",
+            "expected a protocol without `stop`, found one: only `skinrig run` takes its looks\n  next: simulate the protocol without `stop`",
         ));
     }
     let args = RunArgs {

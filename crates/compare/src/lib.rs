@@ -1,4 +1,4 @@
-//! Compares skins: is one better, are they comparable, and what explains the difference.
+//! Compares skins: is one better, are they comparable, and what explains the difference. Compares a session with simulated ones.
 //!
 //! Pure computation: no files, SQL or devices; randomness comes only from the seed in the settings.
 

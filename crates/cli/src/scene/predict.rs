@@ -61,7 +61,7 @@ pub(super) fn predict(args: &ScenePredictArgs, command_line: &str, output: Outpu
                 found.seeds.push(seed);
                 replicates.push(replicate.figures);
             }
-            Err(why) => found.failed.push((seed, why)),
+            Err(why) => found.failed.push((seed, why.message)),
         }
         phase.step(done);
         if stop.load(Ordering::Relaxed) {
@@ -202,7 +202,7 @@ impl<'a> Simulations<'a> {
     }
 
     /// Simulates, records and analyses one session; the inner error says why it cannot be analysed.
-    fn one(&self, seed: u64) -> Result<Result<Opened, String>, Failure> {
+    fn one(&self, seed: u64) -> Result<Result<Opened, Failure>, Failure> {
         let folder = tempfile::Builder::new()
             .prefix("skinrig-scene-")
             .tempdir()
@@ -218,9 +218,8 @@ impl<'a> Simulations<'a> {
             },
             ControlHandle::new(),
         )?;
-        let opened = open(&path, AnalysisRequest::default())
-            .and_then(|(aligned, _)| figures(aligned, &path));
-        Ok(opened.map_err(|failure| failure.message))
+        let opened = open(&path, AnalysisRequest::default());
+        Ok(opened.and_then(|(aligned, _)| figures(aligned, &path)))
     }
 }
 

@@ -175,7 +175,8 @@ fn value(figure: SessionFigure, analysis: &Analysis, cameras: &[EventStatistics]
             deviation(&rates.map(libm::log).collect::<Vec<_>>())
         }
         SessionFigure::IdleRate => {
-            let idle = views(analysis).map(|v| v.iter().map(|v| v.idle_rate_per_s).sum());
+            let known = views(analysis).filter(|v| v.iter().all(|v| v.idle_s > 0.0));
+            let idle = known.map(|v| v.iter().map(|v| v.idle_rate_per_s).sum());
             median(idle.collect())
         }
         SessionFigure::OnAtPress => polarity(|p| (p.at_press, p.on_at_press)),
