@@ -3,11 +3,13 @@
 use proptest::prelude::*;
 use skinrig_analysis::cmre::ContactMap;
 use skinrig_analysis::coverage::{
-    ARC_SEGMENTS, field_of_view, neighbour_distance_mm, overlap, probed_area_mm2, taxels,
+    ARC_SEGMENTS, coverage, field_of_view, neighbour_distance_mm, overlap, probed_area_mm2, taxels,
 };
-use skinrig_analysis::result::Estimate;
+use skinrig_analysis::result::{Estimate, PressResult};
 use skinrig_model::skin::polygon_area_mm2;
-use skinrig_model::{CameraModel, CmreSettings, LensModel, Point2, SkinOutline};
+use skinrig_model::{
+    CameraModel, CmreSettings, LensModel, Point2, PressRole, SkinOutline, Verdict,
+};
 
 const SKIN: SkinOutline = SkinOutline::PAPER;
 
@@ -248,4 +250,25 @@ proptest! {
         let border = 4.0 * side * places.len() as f64 + 400.0;
         prop_assert!((exact - counted * STEP_MM * STEP_MM).abs() < 0.15 * border * STEP_MM, "{exact}");
     }
+}
+
+/// A place that only calibrates, or whose scored presses are left out, is not where the RMSE was measured.
+#[test]
+fn places_without_a_press_in_the_rmse_are_not_probed() {
+    let (input, events) = skinrig_planted::grid::session();
+    let mut analysis = skinrig_analysis::analyze(&input, &events).unwrap();
+    let whole = coverage(&analysis).unwrap();
+    let is_scored = |p: &PressResult| p.role == PressRole::Score;
+    let lost = analysis.presses.iter().find(|p| is_scored(p)).unwrap();
+    let lost = lost.location;
+    for press in &mut analysis.presses {
+        if is_scored(press) && press.location == lost {
+            press.verdict = Verdict::Excluded;
+        }
+    }
+    let found = coverage(&analysis).unwrap();
+    assert_eq!(found.locations + 1, whole.locations);
+    assert_eq!(found.cell_mm, whole.cell_mm);
+    let [part, all] = [found, whole].map(|c| c.probed_mm2.unwrap());
+    assert!(part < all, "{part} {all}");
 }

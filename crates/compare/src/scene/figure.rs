@@ -253,3 +253,59 @@ fn deviation(values: &[f64]) -> Option<f64> {
     let squares: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
     (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn course(contact_per_s: &[f64], lift_per_s: Vec<f64>) -> PressCourse {
+        PressCourse {
+            bin_ms: 10.0,
+            before_per_s: Some(100.0),
+            contact_per_s: contact_per_s.to_vec(),
+            lift_per_s,
+        }
+    }
+
+    #[test]
+    fn the_rise_ends_half_way_to_the_peak() {
+        // From 100 to 1100: half is 600, half way between the bins with 400 and 800, whose middles are 15 and 25 ms.
+        let rising = course(&[100.0, 400.0, 800.0, 1100.0, 900.0], Vec::new());
+        assert_eq!(rise_ms(&rising), Some(20.0));
+        assert_eq!(rise_ms(&course(&[100.0; 5], Vec::new())), None);
+        let unknown = PressCourse {
+            before_per_s: None,
+            ..rising
+        };
+        assert_eq!(rise_ms(&unknown), None);
+    }
+
+    #[test]
+    fn fading_compares_what_is_left_with_the_lift() {
+        let lift = |rest: f64, bins: usize| {
+            let lift = std::iter::repeat_n(1100.0, 20);
+            course(&[], lift.chain(std::iter::repeat_n(rest, bins)).collect())
+        };
+        assert_eq!(fading(&lift(350.0, 40)), Some(0.25));
+        assert_eq!(fading(&lift(100.0, 40)), Some(0.0));
+        // What comes after 600 ms does not count; less than 100 ms say nothing.
+        let mut long = lift(350.0, 40);
+        long.lift_per_s.extend([9_000.0; 30]);
+        assert_eq!(fading(&long), Some(0.25));
+        assert_eq!(fading(&lift(350.0, 9)), None);
+    }
+
+    #[test]
+    fn every_scale_comes_back() {
+        for scale in [Scale::Linear, Scale::Logarithm, Scale::Share] {
+            for x in [0.01, 0.3, 0.99] {
+                assert!((scale.back(scale.of(x)) - x).abs() < 1e-12, "{scale:?} {x}");
+            }
+        }
+        // Ends of intervals of a share stay shares.
+        assert_eq!(
+            (Scale::Share.back(-0.3), Scale::Share.back(2.0)),
+            (0.0, 1.0)
+        );
+    }
+}
