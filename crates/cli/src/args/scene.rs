@@ -60,6 +60,10 @@ pub(crate) struct ScenePredictArgs {
     #[arg(long)]
     pub seed: Option<u64>,
 
+    /// Folder for the simulated sessions, each deleted after its analysis [default: the temporary folder].
+    #[arg(long, value_name = "DIR")]
+    pub sessions: Option<PathBuf>,
+
     /// Write the page here, and the results beside it [default: beside the session].
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

@@ -1,6 +1,6 @@
 //! `skinrig scene predict`: figures of a session against those of simulated sessions of its protocol.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use skinrig_compare::scene::{LEAST_REPLICATES, SessionFigures, predict as compared};
@@ -154,6 +154,8 @@ struct Simulations<'a> {
     changed: Vec<String>,
     level: Option<String>,
     seeds: Vec<u64>,
+    /// Where they are kept until they are analysed.
+    folder: PathBuf,
     command_line: &'a str,
 }
 
@@ -197,6 +199,7 @@ impl<'a> Simulations<'a> {
                 args.replicates,
                 header.seed,
             )?,
+            folder: args.sessions.clone().unwrap_or_else(std::env::temp_dir),
             command_line,
         })
     }
@@ -205,8 +208,13 @@ impl<'a> Simulations<'a> {
     fn one(&self, seed: u64) -> Result<Result<Opened, Failure>, Failure> {
         let folder = tempfile::Builder::new()
             .prefix("skinrig-scene-")
-            .tempdir()
-            .map_err(|e| Failure::internal(format!("no folder for a simulated session: {e}")))?;
+            .tempdir_in(&self.folder)
+            .map_err(|e| {
+                Failure::input(format!(
+                    "{}: no folder for a simulated session: {e}\n  next: --sessions names another folder",
+                    self.folder.display()
+                ))
+            })?;
         let path = simulate(
             Simulation {
                 protocol: self.protocol.clone(),

@@ -148,6 +148,9 @@ fn what_cannot_be_predicted_is_refused() {
     predict(&["--set", "scene.skin.creep=soft"])
         .code(2)
         .expect_stderr(&["scene.skin.creep"]);
+    predict(&["--sessions", "no/such/folder"])
+        .code(2)
+        .expect_stderr(&["no/such/folder", "--sessions names another folder"]);
     predict(&["--level", "kinematic", "--replicates", "8"])
         .code(2)
         .expect_stderr(&["expected at least 8 simulated sessions that can be analysed"]);
