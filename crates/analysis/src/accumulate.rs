@@ -21,7 +21,7 @@ use crate::input::EventSource;
 use crate::press_event_collector::{PressEventCollector, RetentionPlan};
 use crate::press_events::PackedEvent;
 use crate::press_view::{EventCounts, press_view};
-use crate::rates::RateHistogram;
+use crate::rates::{CameraRates, drawn_bin_us};
 use crate::result::{Activity, OffSensor, PicturePixel, PressPicture, PressView, RateZoom};
 use crate::segment::Window;
 use crate::width::width_u;
@@ -68,7 +68,7 @@ pub(crate) struct PassRequest<'a> {
     /// Presses whose phases are counted, sorted by start.
     pub phases: Vec<PhasePlan>,
     /// Histogram to fill, if this pass fills it; the pass then also counts the activity.
-    pub rates: Option<RateHistogram>,
+    pub rates: Option<CameraRates>,
     /// Cache for the events of the crop, for a second pass.
     pub cache: Option<EventCache>,
     /// Counts per pixel to fill, to find the hot ones.
@@ -82,7 +82,7 @@ pub(crate) struct Accumulator<'a> {
     camera: CameraId,
     settings: &'a AnalysisSettings,
     crop: (u16, u16),
-    rates: Option<RateHistogram>,
+    rates: Option<CameraRates>,
     windows: &'a [Window],
     pictured: &'a [(usize, PressId)],
     next: usize,
@@ -130,7 +130,7 @@ struct OpenWindow {
 /// Outputs of [`Accumulator::finish`].
 #[derive(Default)]
 pub(crate) struct PassOutput {
-    pub rates: Option<RateHistogram>,
+    pub rates: Option<CameraRates>,
     /// (row of the plan, view).
     pub views: Vec<(usize, PressView)>,
     pub pictures: Vec<PressPicture>,
@@ -205,7 +205,7 @@ impl<'a> Accumulator<'a> {
             zoom_next: 0,
             event_collector: PressEventCollector::new(kept),
             phase_collector: PhaseCollector::new(phases, settings.crop_v[camera.index()]),
-            bin_us: rate_bin_us(settings),
+            bin_us: drawn_bin_us(settings),
             views: Vec::new(),
             pictures: Vec::new(),
             error: None,
@@ -553,10 +553,6 @@ fn first_from(events: &[CdEvent], time_us: u64) -> usize {
     events.partition_point(|e| e.t_us < time_us)
 }
 
-/// Width of a rate bin in whole µs, at least 1.
-pub(crate) fn rate_bin_us(settings: &AnalysisSettings) -> u64 {
-    (settings.rate_bin_ms * 1e3).round().max(1.0) as u64
-}
 /// Runs one pass over the events of a camera.
 pub(crate) fn pass(
     source: &dyn EventSource,

@@ -135,6 +135,7 @@ fn analyze_by(
     let [mut one, mut two] = cameras;
     let streams = Streams {
         onsets: [&mut one, &mut two].map(|c| std::mem::take(&mut c.onsets)),
+        bursts: [&mut one, &mut two].map(|c| std::mem::take(&mut c.bursts)),
         silences: [&mut one, &mut two].map(|c| std::mem::take(&mut c.silences)),
         begun_s: [one.begun_s, two.begun_s],
         contacts_s: [&mut one, &mut two].map(|c| std::mem::take(&mut c.contacts_s)),

@@ -3,14 +3,14 @@
 
 use skinrig_model::CameraId;
 
-use crate::accumulate::{Accumulator, PassRequest, pass, rate_bin_us};
+use crate::accumulate::{Accumulator, PassRequest, pass};
 use crate::clock::{MarksError, align_by_rates, fit_marks};
 use crate::error::AnalysisError;
 use crate::event_cache::EventCache;
 use crate::hot_pixels::PixelCounts;
 use crate::input::{EventSource, SessionInput};
 use crate::press_spans::{spans, timings};
-use crate::rates::RateHistogram;
+use crate::rates::CameraRates;
 use crate::result::{
     Activity, AlignmentViolation, ClockFit, OffSensor, RatesDetections, RatesEvidence, WarningCause,
 };
@@ -25,7 +25,7 @@ const MOST_REPEATED: f64 = 0.1;
 /// Clock of a camera, and by-products of finding it.
 pub(crate) struct CameraClock {
     pub clock: Option<ClockFit>,
-    pub rates: Option<RateHistogram>,
+    pub rates: Option<CameraRates>,
     pub activity: Option<Activity>,
     pub cache: Option<EventCache>,
     /// Counts per pixel; `None` if the clock was not known before the events.
@@ -76,7 +76,11 @@ impl CameraClocks {
         let spans = spans(input);
         let rates = [0, 1].map(|k| {
             let reading = &self.cameras[k];
-            reading.rates.as_ref().filter(|_| reading.clock.is_none())
+            reading
+                .rates
+                .as_ref()
+                .filter(|_| reading.clock.is_none())
+                .map(CameraRates::fixed)
         });
         if spans.is_empty() || rates.iter().all(Option::is_none) {
             return;
@@ -164,7 +168,7 @@ impl CameraClock {
             PixelCounts::new(settings.crop_v[k], &windows)
         });
         let wanted = PassRequest {
-            rates: Some(RateHistogram::new(rate_bin_us(settings))),
+            rates: Some(CameraRates::new(settings)),
             cache: Some(EventCache::default()),
             pixels,
             ..PassRequest::default()

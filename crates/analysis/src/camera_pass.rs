@@ -2,7 +2,8 @@
 
 use skinrig_model::CameraId;
 
-use crate::accumulate::{Accumulator, PassOutput, PassRequest, SLACK_US, pass, rate_bin_us};
+use crate::accumulate::{Accumulator, PassOutput, PassRequest, SLACK_US, pass};
+use crate::bursts::{PressBurst, press_bursts};
 use crate::camera_clocks::CameraClock;
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
@@ -14,7 +15,7 @@ use crate::locate_presses::CameraObservations;
 use crate::onsets::{Onset, onsets};
 use crate::press_event_collector::RetentionPlan;
 use crate::press_spans::{spans, timings};
-use crate::rates::RateHistogram;
+use crate::rates::CameraRates;
 use crate::result::{
     Activity, ClockFit, HotPixels, OffSensor, PressPicture, PressView, RateSeries, RateZoom,
     Warning, WarningCause,
@@ -40,6 +41,8 @@ pub(crate) struct CameraResult {
     /// First event, s on the host clock; with the contacts.
     pub begun_s: Option<f64>,
     pub onsets: Vec<Onset>,
+    /// One entry per row of the plan.
+    pub bursts: Vec<Option<PressBurst>>,
     pub pictures: Vec<PressPicture>,
     pub zooms: Vec<RateZoom>,
     pub kept: Vec<RetentionPlan>,
@@ -132,7 +135,7 @@ pub(crate) fn camera_pass(
         // Where only hot pixels fire, the camera is silent.
         let any_hot = !hot_pixels.pixels.is_empty();
         let wanted = PassRequest {
-            rates: any_hot.then(|| RateHistogram::new(rate_bin_us(settings))),
+            rates: any_hot.then(|| CameraRates::new(settings)),
             windows: &list,
             pictured: &plan.pictures,
             zooms: zoom_plans(input, plan, &clock),
@@ -159,15 +162,11 @@ pub(crate) fn camera_pass(
         let OffSensor { events, of } = off_sensor;
         warnings.push(WarningCause::EventsOffSensor { events, of });
     }
-    let found = stream(input, &collected, clock.as_ref());
-    let onsets = match (&collected.rates, &clock) {
-        (Some(rates), Some(clock)) => onsets(input, rates, clock),
-        _ => Vec::new(),
-    };
+    let found = stream(input, collected.rates.as_ref(), clock.as_ref());
     let lost = [&input.gaps[k][..], &found.silences.spans()].concat();
     let series = collected
         .rates
-        .map(|r| r.series(clock.as_ref()))
+        .map(|r| r.drawn().series(clock.as_ref()))
         .unwrap_or_default();
     Ok(CameraResult {
         clock,
@@ -177,7 +176,8 @@ pub(crate) fn camera_pass(
         silences: found.silences,
         contacts_s: found.contacts_s,
         begun_s: found.begun_s,
-        onsets,
+        onsets: found.onsets,
+        bursts: found.bursts,
         untimed,
         pictures: collected.pictures,
         zooms: collected.zooms,
@@ -223,7 +223,7 @@ fn pass_warnings(
     if let Some(events) = collected
         .rates
         .as_ref()
-        .map(RateHistogram::beyond)
+        .map(|rates| rates.drawn().beyond())
         .filter(|b| *b > 0)
     {
         warnings.push(WarningCause::EventsDaysAway { events });
@@ -238,27 +238,33 @@ struct Stream {
     /// See [`CameraResult`].
     contacts_s: Vec<f64>,
     begun_s: Option<f64>,
+    onsets: Vec<Onset>,
+    bursts: Vec<Option<PressBurst>>,
 }
 
-fn stream(input: &SessionInput, collected: &PassOutput, clock: Option<&ClockFit>) -> Stream {
-    let (Some(rates), Some(clock)) = (&collected.rates, clock) else {
+fn stream(input: &SessionInput, rates: Option<&CameraRates>, clock: Option<&ClockFit>) -> Stream {
+    let (Some(rates), Some(clock)) = (rates.map(CameraRates::fixed), clock) else {
         return Stream::default();
+    };
+    let counted = Stream {
+        onsets: onsets(input, rates, clock),
+        bursts: press_bursts(input, rates, clock),
+        ..Stream::default()
     };
     let pressed = spans(input);
     let (Some(first), Some(last)) = (pressed.first(), pressed.last()) else {
-        return Stream::default();
+        return counted;
     };
     let ends = (
         clock.camera_us(first.contact_us),
         clock.camera_us(last.release_us),
     );
-    let views = collected.views.iter().map(|(_, view)| *view);
-    let silences = Silences::new(rates, views, ends);
+    let silences = Silences::new(rates, &counted.bursts, ends);
     // The clock of a camera is that of one leg.
     if !input.legs.is_empty() {
         return Stream {
             silences,
-            ..Stream::default()
+            ..counted
         };
     }
     let listed = pressed.iter();
@@ -269,6 +275,7 @@ fn stream(input: &SessionInput, collected: &PassOutput, clock: Option<&ClockFit>
         silences,
         contacts_s: contacts_s(rates, clock, &listed.collect::<Vec<_>>()),
         begun_s: begun_us.map(|us| clock.host_us_of_camera(us) * 1e-6),
+        ..counted
     }
 }
 

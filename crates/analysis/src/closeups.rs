@@ -2,10 +2,11 @@
 
 use skinrig_model::{Background, HostTime, PressId, PressRole};
 
-use crate::accumulate::{ZoomPlan, rate_bin_us};
+use crate::accumulate::ZoomPlan;
 use crate::input::SessionInput;
 use crate::press_event_collector::RetentionPlan;
 use crate::press_events::{EventView, Retention};
+use crate::rates::drawn_bin_us;
 use crate::result::ClockFit;
 use crate::segment::Window;
 use skinrig_statistics::seeded;
@@ -144,7 +145,7 @@ pub(crate) fn keep_plans(
 
 /// Close-ups of one camera, sorted by start.
 pub(crate) fn zoom_plans(input: &SessionInput, plan: &Closeups, clock: &ClockFit) -> Vec<ZoomPlan> {
-    let bin_us = rate_bin_us(&input.settings);
+    let bin_us = drawn_bin_us(&input.settings);
     let mut plans: Vec<ZoomPlan> = plan
         .zooms
         .iter()

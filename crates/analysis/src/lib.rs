@@ -14,6 +14,7 @@ mod analyze;
 mod audit;
 pub mod background;
 pub mod bit_rates;
+mod bursts;
 pub mod calibrate;
 mod camera_clocks;
 mod camera_pass;

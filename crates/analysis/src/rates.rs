@@ -1,13 +1,57 @@
 //! Event rates: a streamed histogram in fine bins, and the reduced series that a report draws.
 
-use skinrig_model::CdEvent;
+use skinrig_model::{AnalysisSettings, CdEvent};
 
 use crate::result::{ClockFit, RateSeries};
 
 /// Maximum number of fine bins: 46 hours of 10 ms. A longer stream has broken times.
 const MAX_BINS: u64 = 1 << 24;
+/// Bins that clocks, silences and the audit use, µs, as in the paper: `rate_bin_ms` changes what is drawn and nothing else.
+const FIXED_BIN_US: u64 = 10_000;
 /// Maximum number of bins in a [`RateSeries`].
 const MAX_SERIES: usize = 4000;
+
+/// Event counts of a camera: in fixed bins, and in the bins that are drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CameraRates {
+    fixed: RateHistogram,
+    /// If its bins are others.
+    drawn: Option<RateHistogram>,
+}
+
+impl CameraRates {
+    /// No counts yet.
+    pub(crate) fn new(settings: &AnalysisSettings) -> Self {
+        let bin_us = drawn_bin_us(settings);
+        Self {
+            fixed: RateHistogram::new(FIXED_BIN_US),
+            drawn: (bin_us != FIXED_BIN_US).then(|| RateHistogram::new(bin_us)),
+        }
+    }
+
+    /// Counts events in time order.
+    pub(crate) fn add_in_order(&mut self, events: &[CdEvent]) {
+        self.fixed.add_in_order(events);
+        if let Some(drawn) = &mut self.drawn {
+            drawn.add_in_order(events);
+        }
+    }
+
+    /// Counts in bins that no setting changes.
+    pub(crate) const fn fixed(&self) -> &RateHistogram {
+        &self.fixed
+    }
+
+    /// Counts in bins of `rate_bin_ms`.
+    pub(crate) fn drawn(&self) -> &RateHistogram {
+        self.drawn.as_ref().unwrap_or(&self.fixed)
+    }
+}
+
+/// Width of a drawn bin in whole µs, at least 1.
+pub(crate) fn drawn_bin_us(settings: &AnalysisSettings) -> u64 {
+    (settings.rate_bin_ms * 1e3).round().max(1.0) as u64
+}
 
 /// Event counts in equal bins of camera time, growing with the stream.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,9 @@
 //! Owns evidence from a camera's stream alone, without the press list: silent periods and bursts.
 
+use crate::bursts::PressBurst;
 use crate::metrics::quantile;
 use crate::rates::RateHistogram;
-use crate::result::{ClockFit, PressView};
+use crate::result::ClockFit;
 
 /// A silence is significant if noise alone would have sent this many events: odds of e^40 against.
 const EXPECTED_EVENTS: f64 = 40.0;
@@ -36,12 +37,14 @@ impl Silences {
     /// camera's times of the first and last planned press.
     pub(crate) fn new(
         rates: &RateHistogram,
-        views: impl Iterator<Item = PressView>,
+        bursts: &[Option<PressBurst>],
         (first_us, last_us): (f64, f64),
     ) -> Self {
-        let mut idle: Vec<f64> = views
-            .filter(|v| v.idle_s > 0.0 && v.events > 0)
-            .map(|v| v.idle_rate_per_s)
+        let mut idle: Vec<f64> = bursts
+            .iter()
+            .flatten()
+            .filter(|burst| burst.events > 0.0)
+            .filter_map(|burst| Some(burst.rates()?.1))
             .collect();
         let idle_per_s = quantile(&mut idle, 0.5).unwrap_or(0.0);
         let least_s = MIN_SILENCE_S.max(EXPECTED_EVENTS / idle_per_s);
@@ -173,25 +176,13 @@ mod tests {
         rates
     }
 
-    fn views(idle_rate_per_s: f64) -> impl Iterator<Item = PressView> {
-        std::iter::repeat_n(
-            PressView {
-                events: 100,
-                on_events: 0,
-                clusters: 0,
-                cluster_events: 0,
-                centroid_u: None,
-                centroid_v: None,
-                rate_per_s: 0.0,
-                idle_rate_per_s,
-                idle_s: 1.0,
-                spread_u: None,
-                spread_v: None,
-                width_u: None,
-                core_threshold: None,
-            },
-            3,
-        )
+    fn bursts(idle_per_s: f64) -> [Option<PressBurst>; 3] {
+        [Some(PressBurst {
+            events: 100.0,
+            press_s: 0.5,
+            idle_events: idle_per_s,
+            idle_s: 1.0,
+        }); 3]
     }
 
     #[test]
@@ -199,13 +190,16 @@ mod tests {
         let lost = [(0.0, 4.0), (10.0, 12.0), (25.0, 30.0)];
         let rates = noisy(&lost, &[]);
         let span = (5e6, 35e6);
-        let found = Silences::new(&rates, views(200.0), span);
+        let found = Silences::new(&rates, &bursts(200.0), span);
         assert_eq!(found.before, Some((0, 9_000_000)));
         assert_eq!(found.between, [(15_000_000, 17_000_000)]);
         assert_eq!(found.after, Some((30_000_000, u64::MAX)));
         // Without noise silence means nothing, and a short one may be chance.
-        assert_eq!(Silences::new(&rates, views(0.0), span), Silences::default());
-        assert_eq!(Silences::new(&rates, views(18.0), span).between, []);
+        assert_eq!(
+            Silences::new(&rates, &bursts(0.0), span),
+            Silences::default()
+        );
+        assert_eq!(Silences::new(&rates, &bursts(18.0), span).between, []);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::fmt;
 
 use skinrig_analysis::result::Fault;
 use skinrig_analysis::{Analysis, analyze};
-use skinrig_model::{PressRole, Verdict};
+use skinrig_model::{AnalysisSettings, PressRole, Verdict};
 
 use crate::bench::Bench;
 use crate::cases::Case;
@@ -128,13 +128,16 @@ impl fmt::Display for CaseVerdict {
     }
 }
 
-/// Analyses a case and evaluates the outcome.
+/// Analyses a case with changed settings and evaluates the outcome.
 #[must_use]
-pub fn judge(case: &Case, seed: u64) -> CaseVerdict {
+pub fn judge(case: &Case, seed: u64, change: fn(&mut AnalysisSettings)) -> CaseVerdict {
     let bench = (case.bench)(seed);
-    let analysis = bench
-        .input()
-        .and_then(|input| analyze(&input, &bench.events()).map_err(|e| e.to_string()));
+    let analysed = |bench: &Bench| {
+        let mut input = bench.input()?;
+        change(&mut input.settings);
+        analyze(&input, &bench.events()).map_err(|e| e.to_string())
+    };
+    let analysis = analysed(&bench);
     let analysis = match analysis {
         Ok(analysis) => analysis,
         Err(why) => return refused(case, why),
@@ -142,9 +145,7 @@ pub fn judge(case: &Case, seed: u64) -> CaseVerdict {
     let faultless = case.papers.and_then(|right| {
         let mut bench = bench.clone();
         right(&mut bench);
-        let input = bench.input().ok()?;
-        let analysis = analyze(&input, &bench.events()).ok()?;
-        analysis.scored.rmse_mm.value
+        analysed(&bench).ok()?.scored.rmse_mm.value
     });
     let numbers = Numbers::of(&bench, &analysis, faultless);
     let named = case.allowed.iter().find_map(|allowed| match allowed {

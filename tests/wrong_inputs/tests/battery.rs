@@ -3,6 +3,7 @@
 #![expect(clippy::print_stdout, reason = "outcomes are printed with --nocapture")]
 
 use rayon::prelude::*;
+use skinrig_model::{AnalysisSettings, WindowAnchor};
 use skinrig_wrong_inputs::cases::{Case, all};
 use skinrig_wrong_inputs::judge::{Allowed, CaseVerdict, Observed, judge};
 
@@ -45,7 +46,7 @@ fn failures(seeds: u64) -> Vec<String> {
     let judged: Vec<(Case, u64, CaseVerdict)> = cases
         .into_par_iter()
         .map(|(case, seed)| {
-            let judged = judge(&case, seed);
+            let judged = judge(&case, seed, |_| {});
             (case, seed, judged)
         })
         .collect();
@@ -88,6 +89,59 @@ fn nor_does_any_of_ten_seeds() {
         failures.len(),
         failures.join("\n")
     );
+}
+
+type Change = fn(&mut AnalysisSettings);
+
+/// Legal settings with which an analysis sees little of the recording.
+const UNUSUAL: [(&str, Change); 4] = [
+    ("windows about the middle", |s| {
+        s.window_anchor = WindowAnchor::Middle;
+    }),
+    ("windows that end at the contact", |s| {
+        s.window_after_contact_ms = Some(1.0);
+    }),
+    ("one event of 64", |s| s.thinning = 64),
+    ("rates drawn in bins of 2 s", |s| s.rate_bin_ms = 2_000.0),
+];
+
+/// Judges the cases, each with the unusual settings that `with` accepts by their number and that of the case.
+fn failures_with_unusual_settings(with: fn(usize, usize) -> bool) -> Vec<String> {
+    let cases: Vec<(usize, Case)> = all().into_iter().enumerate().collect();
+    let cases = cases.into_par_iter().flat_map_iter(|(i, case)| {
+        let chosen = (0..UNUSUAL.len()).filter(move |k| with(i, *k));
+        chosen.map(move |k| (case.clone(), k))
+    });
+    cases
+        .filter_map(|(case, k)| {
+            let (name, change) = UNUSUAL[k];
+            let judged = judge(&case, 0, change);
+            let unknowable = case
+                .allowed
+                .iter()
+                .any(|a| matches!(a, Allowed::Unknowable(_)));
+            let wrong = match judged.observed {
+                Observed::Wrong(_) => !unknowable,
+                // The settings of an analysis are no fault of a recording.
+                Observed::Misnamed(_) | Observed::Named(..) => case.allowed == [Allowed::Right],
+                Observed::Right | Observed::Refused(_) => false,
+            };
+            wrong.then(|| format!("{}: {}, {name}: {judged}", case.group, case.name))
+        })
+        .collect()
+}
+
+#[test]
+fn settings_of_the_analysis_hide_no_fault_and_cause_none() {
+    let failures = failures_with_unusual_settings(|case, k| case % UNUSUAL.len() == k);
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+#[ignore = "every case with each of the settings takes minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-wrong-inputs -- --ignored"]
+fn nor_does_any_setting_with_any_case() {
+    let failures = failures_with_unusual_settings(|_, _| true);
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 /// The cases in `README.md`. Cases of a group that allow the same outcomes share a line.

@@ -141,7 +141,7 @@ fn slices_of_any_size_equal_single_events() {
     let counted = |size: usize| {
         let request = PassRequest {
             windows: &windows,
-            rates: Some(RateHistogram::new(10_000)),
+            rates: Some(CameraRates::new(&settings)),
             ..PassRequest::default()
         };
         let mut all = Accumulator::new(CameraId::One, &settings, request);

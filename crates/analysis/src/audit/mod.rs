@@ -31,6 +31,7 @@ mod segments;
 mod statistics;
 mod whole_presses;
 
+use crate::bursts::PressBurst;
 use crate::input::SessionInput;
 use crate::onsets::Onset;
 use crate::result::{Analysis, Finding};
@@ -47,6 +48,8 @@ pub(crate) struct Streams {
     pub begun_s: [Option<f64>; 2],
     /// Onsets of the presses.
     pub onsets: [Vec<Onset>; 2],
+    /// Events of each press against the idle rate, by row of the plan.
+    pub bursts: [Vec<Option<PressBurst>>; 2],
 }
 
 /// Violated laws, most certain finding first; empty for a plausible session.
@@ -55,7 +58,7 @@ pub(crate) struct Streams {
 /// positions: a calibration can absorb a fault that the nominal geometry shows.
 #[must_use]
 pub(crate) fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Vec<Finding> {
-    let presses_seen = observed_press::observed_presses(input, analysis);
+    let presses_seen = observed_press::observed_presses(input, analysis, &streams.bursts);
     let [one, two] = &streams.silences;
     let found = [
         complete::findings(input, analysis),

@@ -5,6 +5,7 @@ use skinrig_model::{
     RepetitionId,
 };
 
+use crate::bursts::PressBurst;
 use crate::input::SessionInput;
 use crate::result::{Analysis, PressView};
 
@@ -45,10 +46,10 @@ pub(crate) struct CameraObservation {
     pub column: Option<f64>,
     /// Centroid column of any press, px: the analysis locates with it.
     pub centroid: Option<f64>,
-    /// Events in the window above the idle prediction, in standard errors; `None` if unknown, or if the press is at the edge
+    /// Events of the press above the idle prediction, in standard errors; `None` if unknown, or if the press is at the edge
     /// of the nominal field of view or outside it.
     pub response: Option<f64>,
-    /// Events per second in the window and in the idle time before it, if both are known.
+    /// Events per second in the press and in the idle time before it, if both are known.
     pub rates: Option<(f64, f64)>,
 }
 
@@ -68,6 +69,7 @@ impl ObservedPress<'_> {
 pub(crate) fn observed_presses<'a>(
     input: &'a SessionInput,
     analysis: &Analysis,
+    bursts: &[Vec<Option<PressBurst>>; 2],
 ) -> Vec<ObservedPress<'a>> {
     let rows = input.planned.iter().zip(&input.outcomes).enumerate();
     rows.filter_map(|(row, (planned, outcome))| {
@@ -80,7 +82,8 @@ pub(crate) fn observed_presses<'a>(
         let views = analysis.presses.get(row).map_or([None; 2], |p| p.views);
         let sights = CameraId::ALL.map(|camera| {
             let visible = is_visible(input, camera, at);
-            sight(input, views[camera.index()], visible)
+            let burst = bursts[camera.index()].get(row).copied().flatten();
+            sight(input, views[camera.index()], burst, visible)
         });
         Some(ObservedPress {
             press: planned.id,
@@ -110,7 +113,12 @@ fn is_visible(input: &SessionInput, camera: CameraId, at: Point2) -> bool {
     angle > left + FIELD_MARGIN_DEG && angle < right - FIELD_MARGIN_DEG
 }
 
-fn sight(input: &SessionInput, view: Option<PressView>, visible: bool) -> CameraObservation {
+fn sight(
+    input: &SessionInput,
+    view: Option<PressView>,
+    burst: Option<PressBurst>,
+    visible: bool,
+) -> CameraObservation {
     let Some(view) = view else {
         return CameraObservation {
             column: None,
@@ -119,16 +127,8 @@ fn sight(input: &SessionInput, view: Option<PressView>, visible: bool) -> Camera
             rates: None,
         };
     };
-    let rates = (view.idle_s > 0.0).then_some((view.rate_per_s, view.idle_rate_per_s));
-    let response = if view.idle_s > 0.0 && view.rate_per_s > 0.0 {
-        let window_s = f64::from(view.events) / view.rate_per_s;
-        let expected = view.idle_rate_per_s * window_s;
-        // Poisson noise in both counts; the additional event avoids certainty after a silent idle time.
-        let standard_error = (expected * (1.0 + window_s / view.idle_s) + 1.0).sqrt();
-        Some((f64::from(view.events) - expected) / standard_error)
-    } else {
-        (view.events == 0).then_some(0.0)
-    };
+    let rates = burst.and_then(|burst| burst.rates());
+    let response = burst.and_then(|burst| burst.response());
     let strong = view.cluster_events >= input.settings.min_cluster_events
         && response.is_none_or(|r| r > RESPONSE_SIGMAS);
     let centroid = view.centroid_u.filter(|u| u.is_finite());
