@@ -7,7 +7,8 @@
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use skinrig_model::{
-    HostDuration, LocationId, PlannedPress, Point2, Point3, PressId, PressRole, RepetitionId, Skin,
+    HostDuration, LocationId, Places, PlannedPress, Point2, Point3, PressId, PressRole,
+    RepetitionId, Skin,
 };
 
 use crate::plan::{Plan, PressStep, Step};
@@ -43,6 +44,13 @@ fn compile(protocol: &Protocol) -> Plan {
         }
         writer.pause(sync.pause_after);
     }
+    // A position that the path lists again is the same location.
+    let mut places = Places::default();
+    let places: Vec<u32> = protocol
+        .locations
+        .iter()
+        .map(|at| places.add(*at))
+        .collect();
     let visits: Vec<(usize, f64)> = protocol
         .depths_mm
         .iter()
@@ -80,14 +88,16 @@ fn compile(protocol: &Protocol) -> Plan {
             repetition: Some(repetition),
         });
         for (k, (location, depth_mm)) in visits.into_iter().enumerate() {
-            let Some(&at) = protocol.locations.get(location) else {
+            let (Some(&at), Some(&place)) =
+                (protocol.locations.get(location), places.get(location))
+            else {
                 continue;
             };
             let planned = PlannedPress {
                 id: PressId::from_index(0),
                 role: *role,
                 repetition,
-                location: LocationId::from_index(location as u32),
+                location: LocationId::from_index(place),
                 at,
                 depth_mm,
             };

@@ -325,6 +325,22 @@ fn pinned_shuffle() {
     insta::assert_debug_snapshot!("shuffle_seed_3", order);
 }
 
+#[test]
+fn a_point_that_a_path_lists_again_is_the_same_location() {
+    let path = "path={points: [[0 mm, 0 mm], [10 mm, 5 mm], [0.03 mm, 0 mm], [-20 mm, 0 mm], [10 mm, 5 mm]]}";
+    let plan = demo(&[path]).compile();
+    let mut pressed: Vec<(i32, u32)> = plan
+        .presses
+        .iter()
+        .filter(|p| p.role != PressRole::Sync)
+        .map(|p| (p.at.x_mm.round() as i32, p.location.number()))
+        .collect();
+    pressed.sort_unstable();
+    pressed.dedup();
+    assert_eq!(pressed, [(-20, 3), (0, 1), (10, 2)]);
+    assert_eq!(plan.summary().locations, 3);
+}
+
 proptest! {
     #[test]
     fn meanders_visit_each_cell_once_and_step_by_one_pitch(
