@@ -1,5 +1,7 @@
 //! Fault injection: faults of a simulated rig, their times and their sizes.
 
+use std::fmt;
+
 use skinrig_model::{CameraId, HostTime, RigFault, UnsupportedFault};
 
 /// When a fault occurs.
@@ -29,6 +31,51 @@ pub enum MotionPhase {
     Retract,
     /// The set point stops above the skin after an ascent.
     Between,
+}
+
+impl fmt::Display for FaultTrigger {
+    /// As in `--fault`, with numbers from 1: `hold:5`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::At(HostTime::ZERO) => write!(f, "preflight"),
+            Self::At(t) => write!(f, "time:{} s", t.as_secs_f64()),
+            Self::Contact(n) => write!(f, "contact:{}", u64::from(*n) + 1),
+            Self::Moment(MotionPhase::Arming, 0) => write!(f, "arming"),
+            Self::Moment(phase, n) => write!(f, "{}:{}", phase.name(), u64::from(*n) + 1),
+        }
+    }
+}
+
+impl MotionPhase {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Arming => "arming",
+            Self::Travel => "travel",
+            Self::Approach => "press",
+            Self::Hold => "hold",
+            Self::Retract => "retract",
+            Self::Between => "between",
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    /// As in `--fault`: `camera1-drops@hold:5`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Timed(TimedFault { kind, when }) => write!(f, "{}@{when}", kind.name()),
+            Self::PulseLost {
+                camera,
+                train,
+                pulse,
+            } => {
+                write!(f, "pulse {pulse} of mark {train} lost by {camera}")
+            }
+            Self::DeadPress { camera, contact } => {
+                write!(f, "contact {contact} without events in {camera}")
+            }
+        }
+    }
 }
 
 /// A fault of a simulated rig.

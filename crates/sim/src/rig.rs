@@ -198,7 +198,7 @@ pub fn describe(config: &SimConfig) -> String {
             "mean_delay_us": t.mean_delay_us,
             "contact_input": t.contact_input,
         },
-        "faults": config.faults.iter().map(|f| format!("{f:?}")).collect::<Vec<_>>(),
+        "faults": config.faults.iter().map(|f| f.to_string()).collect::<Vec<_>>(),
     });
     if config.level == SimLevel::Geometric {
         value["geometric"] = serde_json::json!({

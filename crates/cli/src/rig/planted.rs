@@ -67,3 +67,30 @@ pub fn refuse(faults: &[PlantedFault], bench: &str) -> Result<(), Failure> {
         ))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_of_the_simulated_rig_are_named_as_they_were_planted() {
+        for text in [
+            "camera1-drops@hold:5",
+            "camera2-storm@contact:1",
+            "robot-lost@press:12",
+            "robot-slow@travel:2",
+            "box-silent@retract:3",
+            "trigger-lost@between:1",
+            "robot-stale@arming",
+            "camera1-unplugged@preflight",
+            "camera2-unplugged@time:1.5 s",
+        ] {
+            let fault = text.parse().unwrap();
+            let faults = of_devices(&[fault]).unwrap();
+            let [found] = &faults[..] else {
+                panic!("{text}: {faults:?}")
+            };
+            assert_eq!(found.to_string(), text);
+        }
+    }
+}
