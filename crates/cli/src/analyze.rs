@@ -192,7 +192,7 @@ fn report_one(
             let reader = SessionReader::open(&target.path).map_err(Failure::session)?;
             let id = reader.session_id().map_err(Failure::session)?;
             let variant = analyses::variant(&target.path, &id, name)?;
-            without_selection(&variant)?;
+            without_selection(&variant, "report")?;
             Some(variant)
         }
     };
@@ -211,14 +211,14 @@ fn report_one(
     Ok((results, paths))
 }
 
-/// Rejects a variant that only its selection can make again.
-pub(crate) fn without_selection(variant: &Variant) -> Result<(), Failure> {
+/// Rejects a variant that only its selection can make again; `command` also takes the selection.
+pub(crate) fn without_selection(variant: &Variant, command: &str) -> Result<(), Failure> {
     let Some(selection) = &variant.selection else {
         return Ok(());
     };
     Err(Failure::input(format!(
         "analysis `{}`: expected a variant without a selection, found one of {selection}\n  next: name the selection instead of the \
-         session: `skinrig report {}`",
+         session: `skinrig {command} {}`",
         variant.name,
         selection.file.display()
     )))

@@ -31,16 +31,6 @@ pub(super) struct SkinSessions {
 
 /// Resolves each skin argument.
 pub(super) fn subjects(args: &CompareArgs) -> Result<Vec<SkinSessions>, Failure> {
-    if let (Some(name), Some(skin)) = (
-        &args.analysis,
-        args.skins
-            .iter()
-            .find(|s| selection::is_named(Path::new(s))),
-    ) {
-        return Err(Failure::input(format!(
-            "--analysis {name}: expected no selection, found {skin}\n  next: leave --analysis out"
-        )));
-    }
     if args.skins.len() > MAX_SKINS {
         return Err(Failure::input(format!(
             "expected at most {MAX_SKINS} skins, found {}\n  next: compare them in groups with a common first one",
@@ -154,17 +144,18 @@ fn session(
     let variant = name
         .map(|name| analyses::variant(path, &facts.session_id, name))
         .transpose()?;
+    if let Some(selected) = selected {
+        let (analysis, stated) =
+            result::analysis(path, &facts.session_id, selected, variant.as_ref())?;
+        return Ok((Session { facts, analysis }, Some(stated)));
+    }
     let choices = match &variant {
         Some(variant) => {
-            without_selection(variant)?;
+            without_selection(variant, "compare")?;
             AnalysisRequest::of_variant(variant)
         }
         None => AnalysisRequest::default(),
     };
-    if let Some(selected) = selected {
-        let (analysis, stated) = result::analysis(path, &facts.session_id, selected)?;
-        return Ok((Session { facts, analysis }, Some(stated)));
-    }
     let analysis = match analyses::stored(path, &facts.session_id, name) {
         Some(analysis) => analysis,
         None => {

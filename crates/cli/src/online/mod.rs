@@ -313,7 +313,7 @@ fn open_valid(
         None => (official, None),
         Some(selected) => {
             let id = reader.session_id().map_err(Failure::session)?;
-            let (analysis, stated) = result::analysis(session, &id, selected)?;
+            let (analysis, stated) = result::analysis(session, &id, selected, None)?;
             (analysis, Some(stated))
         }
     };

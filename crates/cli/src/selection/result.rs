@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::Estimate;
-use skinrig_report::{SelectionEffect, SelectionName};
+use skinrig_report::{SelectionEffect, SelectionName, Variant};
 
 use crate::analyses;
 use crate::analysis_request::AnalysisRequest;
@@ -21,14 +21,18 @@ pub(crate) struct SelectedResult {
     effect: SelectionEffect,
 }
 
-/// The analysis with the selection: that beside the session, or a new one.
+/// The analysis with the selection, also of a variant of its analyses: that beside the session, or a new one.
 pub(crate) fn analysis(
     path: &Path,
     session_id: &str,
     selected: &SelectedPresses,
+    variant: Option<&Variant>,
 ) -> Result<(Analysis, SelectedResult), Failure> {
     let result = |rmse_mm, effect| SelectedResult::new(path, selected, rmse_mm, effect);
-    let label = selected.label();
+    if let Some(variant) = variant {
+        of_selection(variant, selected)?;
+    }
+    let label = variant.map_or_else(|| selected.label(), |v| v.name.clone());
     let stored = analyses::stored(path, session_id, Some(&label));
     let stored = stored.filter(|a| a.settings.selected_out == selected.out);
     let summary = analyses::summary(path, session_id, Some(&label)).ok();
@@ -38,11 +42,27 @@ pub(crate) fn analysis(
     }
     let choices = AnalysisRequest {
         selection: Some(selected),
-        ..AnalysisRequest::default()
+        ..variant.map_or_else(AnalysisRequest::default, AnalysisRequest::of_variant)
     };
     let found = analyze_shown(path, choices).map_err(|f| without_results(path, f))?;
     let stated = SelectedResult::of(&found, selected);
     Ok((found.analysis, stated))
+}
+
+/// Rejects a variant of the whole session or of another selection.
+fn of_selection(variant: &Variant, selected: &SelectedPresses) -> Result<(), Failure> {
+    let found = match &variant.selection {
+        Some(name) if name.sha256 == selected.name.sha256 => return Ok(()),
+        Some(name) => format!("one of {name}"),
+        None => "one of the whole session".to_owned(),
+    };
+    Err(Failure::input(format!(
+        "analysis `{name}`: expected a variant of {selection}, found {found}\n  next: make it with `skinrig analyze {file} --name NAME` \
+         and the settings that differ, or leave --analysis out",
+        name = variant.name,
+        selection = selected.name,
+        file = selected.name.file.display(),
+    )))
 }
 
 /// An analysis that failed, with its session.

@@ -184,6 +184,38 @@ fn a_selection_of_several_sessions_is_used_wherever_a_session_is() {
     assert_eq!(&found["selections"][0]["rmse_without_mm"], without);
     let page = std::fs::read_to_string(&page).unwrap();
     assert!(page.contains("selection `one` (SHA-256"));
+    // A variant of the selection, and one of the other session, have one name.
+    let variant = |of: &str| {
+        skinrig(&[
+            "analyze",
+            of,
+            "--set",
+            "analysis.min_samples=12",
+            "--name",
+            "v",
+        ])
+        .code(0)
+    };
+    skinrig(&[&compare[..], &["--analysis", "v"]].concat())
+        .code(2)
+        .expect_stderr(&["named `v`"]);
+    variant(&sessions[1]);
+    variant(&sessions[0]);
+    skinrig(&[&compare[..], &["--analysis", "v"]].concat())
+        .code(2)
+        .expect_stderr(&[
+            "expected a variant of `one`",
+            "one of the whole session",
+            "--name NAME",
+        ]);
+    variant(&chosen);
+    let found = skinrig(&[&["--json"], &compare[..], &["--analysis", "v"]].concat())
+        .code(0)
+        .json();
+    assert_eq!(found["selections"][0]["excluded"], 1);
+    skinrig(&["compare", &sessions[0], &sessions[1], "--analysis", "v"])
+        .code(2)
+        .expect_stderr(&["one of `one`", "skinrig compare", "one.selection.yaml"]);
     let shown = skinrig(&["tradeoff", &chosen, "--repeats", "1"]).code(0);
     assert!(shown.out.contains("the selection `one`"), "{shown:#?}");
 }
