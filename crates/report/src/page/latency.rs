@@ -81,6 +81,7 @@ pub(super) fn latency(a: &Analysis) -> Option<Table> {
         ));
     }
     notes(&mut grid, l);
+    unthinned(&mut grid, a);
     grid.download("latency_sweep");
     Some(grid)
 }
@@ -208,6 +209,16 @@ fn notes(grid: &mut Table, l: &Latency) {
     ));
 }
 
+/// A note if the located positions are those of fewer events than the detector has.
+fn unthinned(grid: &mut Table, a: &Analysis) {
+    let thinning = a.settings.thinning;
+    if thinning > 1 {
+        grid.note(format!(
+            "Of all events: the detector does not thin. Positions and event rates of presses are those of 1/{thinning} of the events."
+        ));
+    }
+}
+
 /// Latency from the hardware-timestamped contact with its uncertainty budget.
 pub(super) fn from_contact(a: &Analysis) -> Option<Table> {
     let c = a.latency.as_ref()?.from_contact.as_ref()?;
@@ -243,6 +254,7 @@ pub(super) fn from_contact(a: &Analysis) -> Option<Table> {
          detected. An error of the assumed surface height shifts all contacts alike and is not in the budget.",
         c.before_contact, c.missed
     ));
+    unthinned(&mut grid, a);
     grid.download("latency_onsets");
     Some(grid)
 }
