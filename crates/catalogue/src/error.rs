@@ -37,6 +37,16 @@ pub enum CatalogueError {
         /// Error of the database.
         source: Box<sqlx::Error>,
     },
+    /// A server did not let this user in.
+    #[error("{place}: connecting to it: {source}; {next}")]
+    Connection {
+        /// The catalogue, without a password.
+        place: String,
+        /// Error of the connection.
+        source: Box<sqlx::Error>,
+        /// What to do.
+        next: &'static str,
+    },
     /// Another program is writing the catalogue.
     #[error("{place}: {doing}: another program is writing the catalogue; try again")]
     Busy {
@@ -129,7 +139,46 @@ pub enum CatalogueError {
 /// SQLSTATE of a missing right (PostgreSQL manual, appendix A).
 const INSUFFICIENT_PRIVILEGE: &str = "42501";
 
+/// What helps after a failed connection.
+#[cfg(feature = "postgres")]
+fn next_to_connect(error: &sqlx::Error) -> &'static str {
+    let code = error.as_database_error().and_then(|e| e.code());
+    match (error, code.as_deref()) {
+        (sqlx::Error::Tls(_), _) => {
+            "an encrypted connection needs `ssl = on` in the server's postgresql.conf and skinrig built with `--features tls`; \
+             `sslmode=` in the address says what is demanded"
+        }
+        // So are broken certificates reported, of either side.
+        (sqlx::Error::Io(e), _) if e.kind() == std::io::ErrorKind::InvalidData => {
+            "the server's certificate must name the host of the address, and be signed by an authority that this computer knows or \
+             that `sslrootcert=FILE` in the address holds"
+        }
+        (sqlx::Error::Io(e), _) if e.kind() == std::io::ErrorKind::NotFound => {
+            "check the paths in the address: `sslrootcert=FILE`, or `host=FOLDER` of the server's socket"
+        }
+        (sqlx::Error::Io(_), _) => {
+            "check host and port of the address, and whether the server runs"
+        }
+        (_, Some("28000")) => {
+            "the server's pg_hba.conf must admit this user from this computer, perhaps only with `sslmode=require` in the address"
+        }
+        (_, Some("28P01")) => "check user and password",
+        (_, Some("3D000")) => "`createdb` of PostgreSQL creates it",
+        _ => "check the address",
+    }
+}
+
 impl CatalogueError {
+    /// A failed connection to the server at `place`.
+    #[cfg(feature = "postgres")]
+    pub(crate) fn connection(place: &str, source: sqlx::Error) -> Self {
+        Self::Connection {
+            place: place.to_owned(),
+            next: next_to_connect(&source),
+            source: Box::new(source),
+        }
+    }
+
     /// A failed query at `place`.
     pub(crate) fn sql(place: &str, doing: &'static str, source: sqlx::Error) -> Self {
         let place = place.to_owned();

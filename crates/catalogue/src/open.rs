@@ -155,9 +155,9 @@ async fn server(url: &crate::address::ServerUrl) -> Result<Db, CatalogueError> {
         }
     })?;
     let opened = options.application_name("skinrig").connect().await;
-    Ok(Db::Postgres(opened.map_err(|e| {
-        CatalogueError::sql(&place, "connecting to it", e)
-    })?))
+    Ok(Db::Postgres(
+        opened.map_err(|e| CatalogueError::connection(&place, e))?,
+    ))
 }
 
 /// True for a catalogue, false for a missing or empty file. Layout: sqlite.org/fileformat.html section 1.3.

@@ -17,3 +17,5 @@ mod server;
 mod sessions;
 mod support;
 mod synthetic;
+#[cfg(all(unix, feature = "tls"))]
+mod tls;

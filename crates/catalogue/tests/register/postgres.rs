@@ -159,7 +159,11 @@ fn an_unreachable_server_is_an_error_without_its_password() {
         folder.path().display()
     );
     let error = Catalogue::open(Address::parse(url.as_ref()), Access::Write, WAIT).unwrap_err();
-    assert!(matches!(error, CatalogueError::Sql { .. }), "{error:?}");
+    assert!(
+        matches!(error, CatalogueError::Connection { .. }),
+        "{error:?}"
+    );
+    assert!(error.to_string().contains("`host=FOLDER`"), "{error}");
     let text = format!("{error} {error:?}");
     assert!(
         text.contains("postgres://ann@localhost/skins") && !text.contains("secret"),

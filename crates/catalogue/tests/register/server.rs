@@ -21,6 +21,10 @@ const NOBODY: u32 = 65_534;
 pub(crate) struct Server {
     folder: TempDir,
     programs: PathBuf,
+    /// Options of the server process beside its socket.
+    options: String,
+    /// Also part of the name of its socket.
+    port: u16,
 }
 
 impl Server {
@@ -34,7 +38,12 @@ impl Server {
         std::fs::set_permissions(folder.path(), PermissionsExt::from_mode(0o755)).unwrap();
         let own = folder.path().join("own");
         std::fs::create_dir(&own).unwrap();
-        let server = Self { folder, programs };
+        let server = Self {
+            folder,
+            programs,
+            options: "-c listen_addresses=''".to_owned(),
+            port: 5432,
+        };
         if is_root() {
             chown(&own, Some(NOBODY), Some(NOBODY)).unwrap();
         }
@@ -62,7 +71,7 @@ impl Server {
     /// Starts the server, for the first time or after a kill, and waits until it answers.
     pub(crate) fn run_again(&self) {
         let own = self.own();
-        let options = format!("-k {} -c listen_addresses=''", own.display());
+        let options = format!("-k {} {}", own.display(), self.options);
         let words = [
             "-w".into(),
             "-D".into(),
@@ -81,6 +90,43 @@ impl Server {
         let words = ["-D".into(), self.own().join("data").into_os_string()];
         let tail = ["-m", "immediate", "stop"].map(OsString::from);
         self.run("pg_ctl", words.into_iter().chain(tail));
+    }
+
+    /// Starts it again, on a port of this computer that takes encrypted connections alone; returns the port.
+    #[cfg(feature = "tls")]
+    pub(crate) fn encrypt(&mut self) -> u16 {
+        let own = self.own();
+        for (name, mode) in [("server.pem", 0o644), ("server.key", 0o600)] {
+            let to = own.join(name);
+            let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/register/tls");
+            std::fs::copy(from.join(name), &to).unwrap();
+            std::fs::set_permissions(&to, PermissionsExt::from_mode(mode)).unwrap();
+            if is_root() {
+                chown(&to, Some(NOBODY), Some(NOBODY)).unwrap();
+            }
+        }
+        let allowed = "local all all trust\nhostssl all all 127.0.0.1/32 trust\nhostssl all all ::1/128 trust\n";
+        std::fs::write(own.join("data/pg_hba.conf"), allowed).unwrap();
+        let free = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let port = free.local_addr().unwrap().port();
+        drop(free);
+        self.port = port;
+        self.options = format!(
+            "-c listen_addresses=localhost -c port={port} -c ssl=on -c ssl_cert_file={own}/server.pem \
+             -c ssl_key_file={own}/server.key",
+            own = own.display()
+        );
+        self.kill();
+        self.run_again();
+        port
+    }
+
+    /// Starts it again without encryption, on the same port.
+    #[cfg(feature = "tls")]
+    pub(crate) fn unencrypt(&mut self) {
+        self.options = self.options.replace("ssl=on", "ssl=off");
+        self.kill();
+        self.run_again();
     }
 
     fn run(&self, program: &str, words: impl IntoIterator<Item = OsString>) {
@@ -109,7 +155,8 @@ impl Server {
 
     fn url_of(&self, user: &str, database: &str) -> String {
         format!(
-            "postgres://{user}@localhost/{database}?host={}",
+            "postgres://{user}@localhost:{}/{database}?host={}",
+            self.port,
             self.own().display()
         )
     }
