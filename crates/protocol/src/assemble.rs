@@ -188,6 +188,14 @@ fn assemble(
             });
     let scene = keys.scene?;
     scene.within_measured(is_measured, root.at("scene"), out);
+    let least = keys.analysis.as_ref().map_or(0.0, |a| a.min_ray_sine);
+    scene.cameras_see(
+        &locations,
+        outline.centre,
+        least,
+        root.at("scene.cameras"),
+        out,
+    );
     let scene = scene.scene(outline.centre, is_measured);
     let calibrate_at = declared(keys.calibrate_at, |keys| {
         let cameras = scene

@@ -9,7 +9,9 @@ use skinrig_model::{
 use skinrig_settings::{Collector, Diagnostics, Field, Settings, open};
 
 use crate::file::hex;
-use crate::keys::{NominalCamera, PressRoleKeys, ScheduleKeys, calibration_possible, roles};
+use crate::keys::{
+    NominalCamera, PressRoleKeys, ScheduleKeys, calibration_possible, rays_meet, roles,
+};
 use crate::phases::PressPhases;
 use crate::protocol::Prototype;
 
@@ -284,7 +286,27 @@ fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
     let rig = keys.rig?;
     let csv = keys.csv?;
     let presses_per_repetition = keys.presses_per_repetition?;
-    let camera = |camera: &NominalCamera| camera.model(rig.outline.centre);
+    let field = root.at("rig");
+    let centre = rig.outline.centre;
+    let camera = |camera: &NominalCamera, key: &str, out: &mut Collector| {
+        camera.checked(centre, field.at(key), out)
+    };
+    let cameras = [
+        camera(&rig.camera1, "camera1", out)?,
+        camera(&rig.camera2, "camera2", out)?,
+    ];
+    let quarter_mm = 0.25 * rig.outline.width_mm.min(rig.outline.height_mm);
+    let around = [
+        (0.0, 0.0),
+        (1.0, 1.0),
+        (1.0, -1.0),
+        (-1.0, 1.0),
+        (-1.0, -1.0),
+    ];
+    let points = around
+        .map(|(x, y)| Point2::new(centre.x_mm + x * quarter_mm, centre.y_mm + y * quarter_mm));
+    let least = keys.analysis.as_ref().map_or(0.0, |a| a.min_ray_sine);
+    rays_meet(cameras.each_ref(), &points, least, field, out);
     Some(Schedule {
         file_name: String::new(),
         text: String::new(),
@@ -311,9 +333,7 @@ fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
         roles: roles?,
         rig: RigGeometry {
             outline: rig.outline,
-            nominal: StereoGeometry {
-                cameras: [camera(&rig.camera1), camera(&rig.camera2)],
-            },
+            nominal: StereoGeometry { cameras },
             trigger_channel: rig.trigger_channel,
             trigger_delay_us: [0; 2],
         },

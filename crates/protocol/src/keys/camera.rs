@@ -98,6 +98,29 @@ pub(crate) struct NominalCamera {
 }
 
 impl NominalCamera {
+    /// The camera; it aims at `centre` unless the file says otherwise. Reports one that stands where it looks.
+    pub(crate) fn checked(
+        &self,
+        centre: Point2,
+        field: &Field,
+        out: &mut Collector,
+    ) -> Option<CameraModel> {
+        let model = self.model(centre);
+        if model.position != model.aim {
+            return Some(model);
+        }
+        let at = field.at("position");
+        let Point2 { x_mm, y_mm } = model.aim;
+        out.error(
+            at.span,
+            at.path.as_str(),
+            "the camera stands at the point it aims at",
+        )
+        .expected("a position outside the skin, from which the camera looks in")
+        .found(format!("[{x_mm} mm, {y_mm} mm], where its axis points"));
+        None
+    }
+
     /// The camera; it aims at `centre` unless the file says otherwise.
     pub(crate) fn model(&self, centre: Point2) -> CameraModel {
         CameraModel {
@@ -110,4 +133,28 @@ impl NominalCamera {
             },
         }
     }
+}
+
+/// Reports cameras from which every one of these points lies in nearly the same direction: rays that meet at a smaller sine than
+/// `least` locate nothing.
+pub(crate) fn rays_meet(
+    cameras: [&CameraModel; 2],
+    points: &[Point2],
+    least: f64,
+    field: &Field,
+    out: &mut Collector,
+) {
+    let sine = |p: &Point2| {
+        let [a, b] = cameras.map(|c| [p.x_mm - c.position.x_mm, p.y_mm - c.position.y_mm]);
+        let lengths = libm::hypot(a[0], a[1]) * libm::hypot(b[0], b[1]);
+        ((a[0] * b[1] - a[1] * b[0]) / lengths).abs()
+    };
+    let largest = points.iter().map(sine).fold(0.0, f64::max);
+    if points.is_empty() || largest >= least {
+        return;
+    }
+    out.error(field.span, field.path.as_str(), "the cameras see every location from one side")
+        .expected(format!("rays of the two cameras that meet at a sine of at least {least} (`analysis.min_ray_sine`) somewhere"))
+        .found(format!("at most {largest:.4}"))
+        .help("place the cameras apart, as in `skinrig new own-cameras`");
 }

@@ -10,7 +10,7 @@ mod ranges;
 mod scene;
 mod schedule;
 
-pub(crate) use camera::{NominalCamera, Roi};
+pub(crate) use camera::{NominalCamera, Roi, rays_meet};
 pub(crate) use evaluation::{calibration_possible, roles};
 pub(crate) use frame::SyncKeys;
 pub(crate) use motion::{LimitKeys, MotionKeys, MotionParts};

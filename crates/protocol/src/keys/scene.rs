@@ -6,7 +6,7 @@ use skinrig_model::level_bias::{
 use skinrig_model::{HostDuration, Point2, SceneNeed, ScenePart, SimLevel};
 use skinrig_settings::{Collector, Field, Settings};
 
-use super::camera::NominalCamera;
+use super::camera::{NominalCamera, rays_meet};
 use crate::protocol::{Scene, SimulatedSkin};
 
 /// Default needs of a scene: event rates and the position of a press in the picture.
@@ -191,6 +191,25 @@ impl SceneKeys {
 }
 
 impl SceneKeys {
+    /// Reports drawn cameras that see no angles.
+    pub(crate) fn cameras_see(
+        &self,
+        locations: &[Point2],
+        centre: Point2,
+        least_sine: f64,
+        field: &Field,
+        out: &mut Collector,
+    ) {
+        let Some(SceneCameras { camera1, camera2 }) = &self.cameras else {
+            return;
+        };
+        let one = camera1.checked(centre, field.at("camera1"), out);
+        let two = camera2.checked(centre, field.at("camera2"), out);
+        if let (Some(one), Some(two)) = (one, two) {
+            rays_meet([&one, &two], locations, least_sine, field, out);
+        }
+    }
+
     /// Refuses a named level with tolerances where the differences between levels are not measured.
     pub(crate) fn within_measured(&self, is_measured: bool, field: &Field, out: &mut Collector) {
         let Some(level) = self.level.filter(|level| *level < SimLevel::Optical) else {

@@ -121,8 +121,10 @@ pub(crate) struct NominalRig {
     #[setting(shape = OUTLINE_SHAPE, read = SkinOutline::read, show = Setting::text)]
     pub outline: SkinOutline,
     /// Camera 1.
+    #[setting(example = "{position: [45 mm, -38 mm], half_field_of_view: 60 deg}")]
     pub camera1: NominalCamera,
     /// Camera 2.
+    #[setting(example = "{position: [45 mm, 42 mm], half_field_of_view: 60 deg}")]
     pub camera2: NominalCamera,
     /// The trigger channel that carries marks; absent: no trigger line.
     #[setting(max = 31)]

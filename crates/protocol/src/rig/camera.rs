@@ -225,7 +225,7 @@ fn geometry(f: &Field, out: &mut Collector) -> Option<CameraModel> {
         return None;
     }
     let camera = NominalCamera::from_field(f, out)?;
-    Some(camera.model(Point2::new(0.0, 0.0)))
+    camera.checked(Point2::new(0.0, 0.0), f, out)
 }
 
 impl CameraSetup {

@@ -126,3 +126,41 @@ fn the_shipped_scene_of_the_paper_has_every_part() {
     assert_eq!(protocol.scene.parts, ScenePart::ALL);
     assert_eq!(protocol.scene.level, SimLevel::Optical);
 }
+
+#[test]
+fn cameras_that_see_no_angles_are_refused() {
+    let cameras = |one: &str, two: &str| {
+        let camera = |place: &str| format!("{{position: {place}, half_field_of_view: 60 deg}}");
+        let both = format!("camera1: {}, camera2: {}", camera(one), camera(two));
+        parse(
+            &shipped("demo.yaml"),
+            &[&format!("scene.cameras={{{both}}}")],
+        )
+    };
+    let refused = |one: &str, two: &str, parts: &[&str]| {
+        let text = cameras(one, two).unwrap_err().render(false);
+        for part in parts {
+            assert!(text.contains(part), "expected {part:?} in {text}");
+        }
+    };
+    assert!(cameras("[45 mm, -38 mm]", "[45 mm, 42 mm]").is_ok());
+    // The centre of the outline, where its axis points.
+    refused(
+        "[10 mm, 2 mm]",
+        "[45 mm, 42 mm]",
+        &[
+            "scene.cameras.camera1.position",
+            "stands at the point it aims at",
+        ],
+    );
+    refused(
+        "[45 mm, 42 mm]",
+        "[45 mm, 42 mm]",
+        &[
+            "scene.cameras",
+            "from one side",
+            "sine of at least 0.05",
+            "at most 0.0000",
+        ],
+    );
+}
