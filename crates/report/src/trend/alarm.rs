@@ -4,7 +4,7 @@ use skinrig_nightly::Cause;
 use skinrig_nightly::trend::{Alarm, Chart, Report};
 
 use super::name::{series_name, with_names};
-use super::{Links, cause, moved, since};
+use super::{Links, cause, moved_by, since};
 use crate::document::{Block, Note, Text, Tone, paragraph, soft};
 
 /// An alarm of a page.
@@ -29,7 +29,7 @@ fn view<'a>(report: &'a Report, alarm: &Alarm, links: &Links) -> AlarmView<'a> {
     let series = |at: &usize| {
         let chart = &report.charts[*at];
         let name = series_name(&chart.series.name);
-        (chart, format!("{name}: {}", moved(chart)).into())
+        (chart, format!("{name}: {}", moved_by(chart, alarm)).into())
     };
     let title = format!(
         "{} series moved, {}",

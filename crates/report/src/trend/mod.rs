@@ -7,7 +7,7 @@ mod page;
 mod terminal;
 
 use skinrig_nightly::trend::report::{cause_name, day, format_change, format_number as number};
-use skinrig_nightly::trend::{Alarm, Chart, Report, SeriesState};
+use skinrig_nightly::trend::{Alarm, Chart, Excursion, Report, SeriesState};
 
 pub(crate) use alarm::alarms;
 pub(crate) use name::with_names;
@@ -77,6 +77,16 @@ fn with_unit(value: f64, unit: &str) -> String {
     } else {
         format!("{} {unit}", number(value))
     }
+}
+
+/// Size of the drift that an alarm is about, also of one that has ended.
+fn moved_by(chart: &Chart, alarm: &Alarm) -> String {
+    let [first, last] = alarm.since;
+    let is_of_alarm = |e: &&Excursion| e.change.nights[0] <= first && e.change.nights[1] >= last;
+    let found = chart.excursions.iter().rev().find(is_of_alarm);
+    let size = found.map(|e| format_change(e, &chart.series.unit));
+    let ended = found.is_some_and(|e| e.ended.is_some());
+    size.unwrap_or_default() + if ended { ", ended" } else { "" }
 }
 
 /// Size of the drift.

@@ -8,7 +8,7 @@ use skinrig_text::{
     Blocks, Column as Cells, LongWords, Paint, Style as Look, WIDTH, cut, hang, sparkline, wrap,
 };
 
-use super::{Links, cause, moved, since, state, with_unit};
+use super::{Links, cause, moved_by, since, state, with_unit};
 use crate::document::{Block, Column, Row, Table, lines};
 use crate::format::plain;
 
@@ -68,7 +68,8 @@ pub fn terminal(
         }
         for at in alarm.charts.iter().take(MAX_CHARTS) {
             out.push('\n');
-            plot(&mut out, report, &report.charts[*at], style);
+            let chart = &report.charts[*at];
+            plot(&mut out, report, chart, &moved_by(chart, alarm), style);
         }
     }
     let charts = report.charts.iter().filter(|c| shown(&c.series.name));
@@ -135,7 +136,7 @@ fn spark(report: &Report, chart: &Chart, style: Style) -> String {
 }
 
 /// Chart of one series: values, centre of the reference, change point.
-fn plot(out: &mut String, report: &Report, chart: &Chart, style: Style) {
+fn plot(out: &mut String, report: &Report, chart: &Chart, moved: &str, style: Style) {
     let (columns, rows) = PLOT;
     let (dot, centre, change) = if style.unicode {
         ('●', '─', '┊')
@@ -172,7 +173,7 @@ fn plot(out: &mut String, report: &Report, chart: &Chart, style: Style) {
     for (at, value) in &shown {
         cells[row(*value)][*at] = dot;
     }
-    let _ = writeln!(out, "  {} ({})", plain(&chart.series.name), moved(chart));
+    let _ = writeln!(out, "  {} ({moved})", plain(&chart.series.name));
     for (at, cells) in cells.iter().enumerate() {
         let label = match (at, middle) {
             (0, _) => number(high),

@@ -132,7 +132,14 @@ fn alarms(charts: &[Chart], nights: &[NightSummary]) -> (Vec<Alarm>, Vec<Alarm>)
     let mut grouped: Vec<Alarm> = Vec::new();
     for (at, excursion) in all {
         let [first, last] = excursion.change.nights;
-        let overlaps = |a: &&mut Alarm| first <= a.since[1] && last >= a.since[0];
+        // What had ended when another was raised is an alarm of its own.
+        let before = |ended: Option<usize>, raised: usize| ended.is_some_and(|n| n < raised);
+        let overlaps = |a: &&mut Alarm| {
+            first <= a.since[1]
+                && last >= a.since[0]
+                && !before(a.ended, excursion.raised)
+                && !before(excursion.ended, a.raised)
+        };
         match grouped.iter_mut().find(overlaps) {
             Some(alarm) => {
                 alarm.charts.push(at);
