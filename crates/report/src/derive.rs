@@ -8,7 +8,9 @@ use skinrig_analysis::result::{
 };
 use skinrig_analysis::rule::Rule;
 use skinrig_analysis::triangulate::locate;
-use skinrig_model::{CameraId, LocationId, Locator, Point2, PressId, PressRole, Verdict, quantile};
+use skinrig_model::{
+    CameraId, LocationId, Locator, Point2, PressId, PressRole, StopMetric, Verdict, quantile,
+};
 
 use crate::format::{grouped, interval, number};
 
@@ -207,11 +209,22 @@ pub(crate) struct RmseAtLook {
     pub extent: String,
 }
 
+/// The level of the interval of `metric`, in percent, if it is that of a look; others have 95 % intervals.
+#[must_use]
+pub(crate) fn level_at_look(analysis: &Analysis, metric: StopMetric) -> Option<String> {
+    let found = match metric {
+        StopMetric::Rmse => &analysis.scored.rmse_mm,
+        StopMetric::Median => &analysis.scored.median_mm,
+    };
+    let look = analysis.campaign.as_ref()?.look_of(metric, found)?;
+    Some(number(Some(look.level_percent()), 1))
+}
+
 /// `None` for other sessions: their RMSE has a 95 % interval.
 #[must_use]
 pub(crate) fn rmse_at_look(analysis: &Analysis) -> Option<RmseAtLook> {
     let campaign = analysis.campaign.as_ref()?;
-    let look = campaign.of_rmse(&analysis.scored.rmse_mm)?;
+    let look = campaign.look_of(StopMetric::Rmse, &analysis.scored.rmse_mm)?;
     let end = |mm: Option<f64>| mm.map_or_else(|| "open".to_owned(), |mm| number(Some(mm), 2));
     Some(RmseAtLook {
         value: number(Some(look.value_mm), 2),

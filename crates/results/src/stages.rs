@@ -10,7 +10,8 @@ use skinrig_analysis::{
     Analysis, LegStart, Retention, SessionInput, analyze_recalibrated, analyze_with_events, legs,
 };
 use skinrig_model::{
-    AttemptId, HostTime, PressId, PressOutcome, PressRole, Reaction, TouchEstimate, Verdict,
+    AttemptId, HostTime, PressId, PressOutcome, PressRole, Reaction, StopMetric, TouchEstimate,
+    Verdict,
 };
 use skinrig_protocol::Online;
 use skinrig_recorder::{RecorderError, SessionReader};
@@ -113,9 +114,14 @@ impl AlignedSession {
         let plan_json = &self.session.header.plan_json;
         let campaign = campaign::looks(&analysis, plan_json, end.as_ref())?;
         // The data chose the number of presses: the usual interval would cover less often than it says.
-        let rmse_mm = &mut analysis.scored.rmse_mm;
-        if let Some(look) = campaign.as_ref().and_then(|c| c.of_rmse(rmse_mm)) {
-            (rmse_mm.low, rmse_mm.high) = (look.low_mm, look.high_mm);
+        let scored = &mut analysis.scored;
+        for (metric, found) in [
+            (StopMetric::Rmse, &mut scored.rmse_mm),
+            (StopMetric::Median, &mut scored.median_mm),
+        ] {
+            if let Some(look) = campaign.as_ref().and_then(|c| c.look_of(metric, found)) {
+                (found.low, found.high) = (look.low_mm, look.high_mm);
+            }
         }
         analysis.warnings.extend(campaign.as_ref().map(|found| {
             let (looks, declared) = (found.looks.len(), found.declared);

@@ -22,12 +22,12 @@ pub struct CampaignLooks {
 }
 
 impl CampaignLooks {
-    /// The look whose interval the RMSE has: the last one, if the campaign asks about this metric and the look is of these presses.
+    /// The look whose interval `metric` has: the last one, if the campaign asks about it and the look is of the presses of `found`.
     #[must_use]
-    pub fn of_rmse(&self, rmse_mm: &Estimate) -> Option<&Look> {
+    pub fn look_of(&self, metric: StopMetric, found: &Estimate) -> Option<&Look> {
         let look = self.looks.last()?;
         // After a look that could not be taken, an earlier one stands for fewer presses than were made.
-        let is_latest = self.decided.is_some() || look.presses == rmse_mm.n;
-        (look.metric == StopMetric::Rmse && is_latest).then_some(look)
+        let is_latest = self.decided.is_some() || look.presses == found.n;
+        (look.metric == metric && is_latest).then_some(look)
     }
 }

@@ -98,6 +98,27 @@ fn a_campaign_ends_with_the_look_that_decides() {
 }
 
 #[test]
+fn a_question_about_the_median_gives_the_median_its_interval() {
+    let lab = Lab::new();
+    let stop = "{metric: median, target: 40 mm, looks: [2, 3, 4]}";
+    let (session, _) = run(&lab, "s", stop);
+    let scored = &results(&lab, "s")["analysis"]["scored"];
+    let look = &show(&session)["end_cause"]["decided"];
+    let ends = |of: &Value, low: &str, high: &str| [of[low].clone(), of[high].clone()];
+    assert_eq!(
+        ends(&scored["median_mm"], "low", "high"),
+        ends(look, "low_mm", "high_mm")
+    );
+    assert_ne!(
+        ends(&scored["rmse_mm"], "low", "high"),
+        ends(look, "low_mm", "high_mm")
+    );
+    let shown = skinrig(&["analyze", &text(&session), "-v"]).code(0).out;
+    let median = shown.lines().find(|l| l.contains("median error")).unwrap();
+    assert!(median.contains("98.3 %"), "{shown}");
+}
+
+#[test]
 fn a_question_is_not_decided_by_losing_presses() {
     let lab = Lab::new();
     let lost = [

@@ -8,6 +8,7 @@ use skinrig_analysis::result::{
     Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
     PressCounts,
 };
+use skinrig_model::StopMetric;
 use skinrig_text::{Column as Cells, Paint, Style, WIDTH, clip};
 
 pub(crate) use self::summary::summary;
@@ -198,15 +199,18 @@ fn scored(input: &ReportInput<'_>) -> Section {
         ])
     };
     let mut table = Table::of("scored", "Scored presses", columns);
-    // The RMSE of a campaign that ends by itself has the level of its look.
-    let level = derive::rmse_at_look(a).map_or_else(String::new, |at| format!(" {} %", at.level));
+    // The metric that a campaign asks about has the level of its look.
+    let level = |metric| {
+        let level = derive::level_at_look(a, metric);
+        level.map_or_else(String::new, |level| format!(" {level} %"))
+    };
     for r in metric_rows(a) {
         let is_rmse = r.key == "rmse";
         let style = is_rmse.then_some(Style::Bold);
-        let interval = if is_rmse {
-            r.interval + &level
-        } else {
-            r.interval
+        let interval = match r.key {
+            "rmse" => r.interval + &level(StopMetric::Rmse),
+            "median" => r.interval + &level(StopMetric::Median),
+            _ => r.interval,
         };
         let row = row(r.name, r.value, r.unit, interval, r.n, r.what_n);
         table.add(row.style(style));
@@ -216,7 +220,8 @@ fn scored(input: &ReportInput<'_>) -> Section {
     }
     let rmse = &a.scored.rmse_mm;
     if let Some(share) = a.scored.rmse_diagonal_percent {
-        let interval = interval(rmse, 100.0 / a.rig.outline.diagonal_mm(), 2) + &level;
+        let interval =
+            interval(rmse, 100.0 / a.rig.outline.diagonal_mm(), 2) + &level(StopMetric::Rmse);
         let (name, value) = ("RMSE, share of diagonal", number(Some(share), 2));
         table.add(row(
             name.to_owned(),
