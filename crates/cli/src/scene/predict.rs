@@ -5,7 +5,8 @@ use std::sync::atomic::Ordering;
 
 use skinrig_compare::scene::{LEAST_REPLICATES, SessionFigures, predict as compared};
 use skinrig_controller::ControlHandle;
-use skinrig_model::RunHeader;
+use skinrig_model::{RunEnd, RunHeader, StopReason};
+use skinrig_recorder::SessionReader;
 use skinrig_report::scene_prediction::{ScenePrediction, page, terminal_text};
 use skinrig_results::{AlignedSession, Origin, RigDocument, SessionEvents, event_statistics};
 
@@ -37,6 +38,7 @@ pub(super) fn predict(args: &ScenePredictArgs, command_line: &str, output: Outpu
     let html_path = args.out.clone().unwrap_or_else(|| scene_path(path));
     check_writable(&html_path)?;
     let (aligned, _) = open(path, AnalysisRequest::default())?;
+    ran_through(&aligned.session.reader, path)?;
     let identity = SessionIdentity::of(&aligned.session.reader).map_err(Failure::session)?;
     let phase = Phase::reading("analysing the session", aligned.events.bytes_read());
     let session = figures(aligned, path)?;
@@ -107,6 +109,23 @@ pub(super) fn predict(args: &ScenePredictArgs, command_line: &str, output: Outpu
         return Ok(Exit::Stopped);
     }
     Ok(Exit::Ok)
+}
+
+/// Rejects what a simulated run is unlike, whatever its scene: presses after a break follow other ones, and a part has other
+/// figures than the whole.
+fn ran_through(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
+    let legs = reader.legs().map_err(Failure::session)?.len();
+    let found = match reader.end().map_err(Failure::session)? {
+        _ if legs > 1 => format!("{legs} legs: it was resumed"),
+        Some((_, RunEnd::Completed | RunEnd::Stopped(StopReason::Decided(_)))) => return Ok(()),
+        Some(_) => "one that was ended before".to_owned(),
+        None => "one without an end".to_owned(),
+    };
+    Err(Failure::input(format!(
+        "{}: expected a session that ran through, as the simulated ones do, found {found}\n  next: take a session of the same skin \
+         that ran through",
+        path.display()
+    )))
 }
 
 /// Fewer simulated sessions than a prediction needs.

@@ -1,6 +1,6 @@
 //! `skinrig scene check`: sessions and RAW files side by side, and what it refuses.
 
-use crate::support::{Lab, only, skinrig, text};
+use crate::support::{Lab, SMALL, only, skinrig, text};
 
 #[test]
 fn recordings_stand_side_by_side() {
@@ -154,4 +154,14 @@ fn what_cannot_be_predicted_is_refused() {
     predict(&["--level", "kinematic", "--replicates", "8"])
         .code(2)
         .expect_stderr(&["expected at least 8 simulated sessions that can be analysed"]);
+
+    // The first press after a break follows sync presses, not the one before it in the plan.
+    let folder = lab.text("broken");
+    let fault = ["--fault", "disk-full@press:5", "--sessions", &folder];
+    skinrig(&[&["run", SMALL], &fault[..]].concat()).code(3);
+    let broken = text(&only(&lab.path("broken"), ".session.sqlite"));
+    let predicted = || skinrig(&["scene", "predict", &broken]).code(2);
+    predicted().expect_stderr(&["ran through", "without an end"]);
+    skinrig(&["resume", &broken]).code(0);
+    predicted().expect_stderr(&["ran through", "2 legs: it was resumed"]);
 }
