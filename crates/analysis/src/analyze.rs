@@ -10,6 +10,7 @@ use crate::closeups::Closeups;
 use crate::error::AnalysisError;
 use crate::indentation;
 use crate::input::{EventSource, SessionInput};
+use crate::judging_settings::JudgingSettings;
 use crate::locate_presses::{
     CalibrationOrigin, LocatedPresses, locate_presses, locate_recalibrated,
 };
@@ -199,6 +200,10 @@ fn analyze_by(
         motion: None,
     };
     evaluate(&mut analysis, input, &streams, &kept)?;
+    if let Some(judging) = JudgingSettings::of(input, &analysis) {
+        let judged = analyze_by(&judging.input(input), source, Retention::Scored, origin);
+        judging.apply(&mut analysis, judged.ok().map(|(by, _)| by.findings));
+    }
     Ok((analysis, kept))
 }
 

@@ -89,6 +89,8 @@ pub struct SessionInput {
     pub rig: RigGeometry,
     /// The settings.
     pub settings: AnalysisSettings,
+    /// The settings of the recording, if these are others: the audit judges by them.
+    pub recorded_settings: Option<AnalysisSettings>,
 }
 
 impl SessionInput {

@@ -39,6 +39,7 @@ mod hash;
 pub mod hot_pixels;
 mod indentation;
 pub mod input;
+mod judging_settings;
 mod lanes;
 pub mod latency;
 mod leg;

@@ -201,7 +201,7 @@ pub fn simulate(simulation: Simulation, control: ControlHandle) -> Result<PathBu
     };
     if checked.plan.stop.is_some() {
         return Err(Failure::input(
-            "expected a protocol without `stop`, found one: only `skinrig run` takes its looks\n  next: simulate the protocol without `stop`",
+            "expected a protocol without `stop`, found one: only `skinrig run` takes its looks\n  next: simulate a copy of the protocol file without its `stop`; `skinrig scene predict` takes it with --protocol FILE",
         ));
     }
     let args = RunArgs {

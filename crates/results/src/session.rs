@@ -27,6 +27,7 @@ pub struct Session {
     pub settings: AnalysisSettings,
     /// True if they differ from the recorded settings.
     pub is_changed: bool,
+    recorded_settings: AnalysisSettings,
     pub(crate) reference_code: bool,
     pub(crate) calibration_from: Option<PathBuf>,
     pub(crate) rig: RigGeometry,
@@ -56,6 +57,7 @@ impl Session {
                 || options.reference_code
                 || options.calibration_from.is_some(),
             settings,
+            recorded_settings: rig.analysis,
             reference_code: options.reference_code,
             calibration_from: options.calibration_from.map(Path::to_owned),
             header,
@@ -106,6 +108,8 @@ impl Session {
             hold_forces_n,
             legs: legs.collect(),
             rig: self.rig,
+            recorded_settings: (self.settings != self.recorded_settings)
+                .then(|| self.recorded_settings.clone()),
             settings: self.settings.clone(),
         })
     }

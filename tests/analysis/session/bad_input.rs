@@ -141,6 +141,35 @@ fn a_recording_that_holds_each_event_twice_is_named() {
     );
 }
 
+/// A session whose settings see too little of its presses is not faulty, and says that they do not suit it.
+#[test]
+fn settings_that_do_not_suit_a_recording_are_told() {
+    let (input, source) = session();
+    let unsuitable = |change: fn(&mut SessionInput)| {
+        let mut input = input.clone();
+        change(&mut input);
+        let analysis = analyze(&input, &source).unwrap();
+        let is_of_settings =
+            |w: &&Warning| matches!(w.cause, WarningCause::UnsuitableSettings { .. });
+        let told = analysis.warnings.iter().find(is_of_settings).cloned();
+        assert!(
+            analysis.findings.iter().all(|f| !f.invalidates),
+            "{:?}",
+            analysis.findings
+        );
+        told.map(|w| w.to_string())
+    };
+    assert_eq!(unsuitable(|_| ()), None);
+    // Windows of 3 s hold several presses. Own settings are judged by the defaults, those of a variant by the recorded ones.
+    let told = unsuitable(|i| i.settings.window_before_ms = 3_000.0);
+    assert!(told.is_some_and(|text| text.contains("looks faulty (clock wrong)")));
+    let told = unsuitable(|i| {
+        i.recorded_settings = Some(i.settings.clone());
+        i.settings.window_before_ms = 3_000.0;
+    });
+    assert!(told.is_some());
+}
+
 #[test]
 fn broken_times_are_errors_and_never_panic() {
     let (input, mut source) = session();

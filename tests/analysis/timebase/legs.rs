@@ -103,6 +103,7 @@ fn input(s: &JoinedLegs) -> SessionInput {
             trigger_delay_us: [0; 2],
         },
         settings: AnalysisSettings::default(),
+        recorded_settings: None,
     }
 }
 

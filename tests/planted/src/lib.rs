@@ -51,6 +51,7 @@ pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
         legs: Vec::new(),
         rig,
         settings,
+        recorded_settings: None,
     }
 }
 

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use skinrig_analysis::result::Fault;
-use skinrig_analysis::{Analysis, analyze};
-use skinrig_model::{AnalysisSettings, PressRole, Verdict};
+use skinrig_analysis::{Analysis, SessionInput, analyze};
+use skinrig_model::{PressRole, Verdict};
 
 use crate::bench::Bench;
 use crate::cases::Case;
@@ -128,13 +128,13 @@ impl fmt::Display for CaseVerdict {
     }
 }
 
-/// Analyses a case with changed settings and evaluates the outcome.
+/// Analyses a case, changed in this way, and evaluates the outcome.
 #[must_use]
-pub fn judge(case: &Case, seed: u64, change: fn(&mut AnalysisSettings)) -> CaseVerdict {
+pub fn judge(case: &Case, seed: u64, change: impl Fn(&mut SessionInput)) -> CaseVerdict {
     let bench = (case.bench)(seed);
     let analysed = |bench: &Bench| {
         let mut input = bench.input()?;
-        change(&mut input.settings);
+        change(&mut input);
         analyze(&input, &bench.events()).map_err(|e| e.to_string())
     };
     let analysis = analysed(&bench);

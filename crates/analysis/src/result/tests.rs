@@ -251,6 +251,11 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "expected at least one of 20 presses to count, found none: 12 missed, 3 invalid, 5 excluded",
         ),
         (
+            json!({"kind": "unsuitable_settings", "fault": "clock_wrong"}),
+            "with these settings of the analysis the session looks faulty (clock wrong), with the defaults it does not: they do not suit the \
+             recording",
+        ),
+        (
             json!({"kind": "no_scored_press"}),
             "no scored press was attempted, so there are no metrics",
         ),

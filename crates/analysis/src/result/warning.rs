@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CalibrationModel, CameraId, Locator, PressId, Reaction, StopQuestion};
 
-use super::Estimate;
+use super::{Estimate, Fault};
 use crate::clock::{MarksError, RatesError};
 use crate::exclusion::Exclusion;
 use crate::locator::FitError;
@@ -72,6 +72,7 @@ impl WarningCause {
                 | Self::WithoutReaction { .. }
                 | Self::UndecidedLooks { .. }
                 | Self::WindowsOverlap
+                | Self::UnsuitableSettings { .. }
                 | Self::LocatorUnfit { .. }
                 | Self::FewLocationsForModel { .. }
                 | Self::ImplausibleModel { .. }
@@ -249,6 +250,16 @@ pub enum WarningCause {
         highest_per_s: f64,
         /// Their share of the idle events.
         idle_share: f64,
+    },
+    /// The audit found a fault that disappears with the default settings.
+    #[error(
+        "with these settings of the analysis the session looks faulty ({}), with the defaults it does not: they do not suit the \
+         recording",
+        .fault.name()
+    )]
+    UnsuitableSettings {
+        /// The first of its findings.
+        fault: Fault,
     },
     /// No metrics.
     #[error("no scored press was attempted, so there are no metrics")]

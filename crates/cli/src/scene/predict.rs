@@ -41,7 +41,13 @@ pub(super) fn predict(args: &ScenePredictArgs, command_line: &str, output: Outpu
     ran_through(&aligned.session.reader, path)?;
     let identity = SessionIdentity::of(&aligned.session.reader).map_err(Failure::session)?;
     let phase = Phase::reading("analysing the session", aligned.events.bytes_read());
-    let session = figures(aligned, path)?;
+    let session = figures(aligned, path, || {
+        format!(
+            "{}: expected a valid session, found an INVALID one: its positions or clocks are wrong, not its scene\n  next: `skinrig \
+             analyze {0}` names the fault",
+            path.display()
+        )
+    })?;
     drop(phase);
     let simulations = Simulations::of(&session.header, args, command_line)?;
     let stop = leave_on_ctrl_c().map_err(Failure::internal)?;
@@ -117,7 +123,10 @@ fn ran_through(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
     let legs = reader.legs().map_err(Failure::session)?.len();
     let found = match reader.end().map_err(Failure::session)? {
         _ if legs > 1 => format!("{legs} legs: it was resumed"),
-        Some((_, RunEnd::Completed | RunEnd::Stopped(StopReason::Decided(_)))) => return Ok(()),
+        Some((_, RunEnd::Completed)) => return Ok(()),
+        Some((_, RunEnd::Stopped(StopReason::Decided(_)))) => {
+            "one that its `stop` ended".to_owned()
+        }
         Some(_) => "one that was ended before".to_owned(),
         None => "one without an end".to_owned(),
     };
@@ -144,18 +153,18 @@ fn too_few(found: &ScenePrediction, args: &ScenePredictArgs) -> Failure {
 }
 
 /// The figures of a session, without studies, which none of them needs.
-fn figures(mut aligned: AlignedSession, path: &Path) -> Result<Opened, Failure> {
+fn figures(
+    mut aligned: AlignedSession,
+    path: &Path,
+    invalid: impl FnOnce() -> String,
+) -> Result<Opened, Failure> {
     aligned.input.settings.study_presses = 0;
     let header = aligned.session.header.clone();
     let name = aligned.session.path.clone();
     let events = SessionEvents::new(&name, header.stream_formats, &aligned.input.legs);
     let analysis = aligned.analyze()?.analysis;
     if !analysis.is_valid() {
-        return Err(Failure::limit(format!(
-            "{}: expected a valid session, found an INVALID one: its positions or clocks are wrong, not its scene\n  next: `skinrig \
-             analyze {0}` names the fault",
-            path.display()
-        )));
+        return Err(Failure::limit(invalid()));
     }
     let cameras = event_statistics(&events, Some(&analysis))
         .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
@@ -246,7 +255,8 @@ impl<'a> Simulations<'a> {
             ControlHandle::new(),
         )?;
         let opened = open(&path, AnalysisRequest::default());
-        Ok(opened.and_then(|(aligned, _)| figures(aligned, &path)))
+        let invalid = || "its analysis is INVALID".to_owned();
+        Ok(opened.and_then(|(aligned, _)| figures(aligned, &path, invalid)))
     }
 }
 

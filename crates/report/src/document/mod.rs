@@ -250,7 +250,7 @@ pub(crate) enum Tone {
 }
 
 /// A remark with a label.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Note {
     tone: Tone,
     label: String,

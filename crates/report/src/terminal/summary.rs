@@ -27,11 +27,16 @@ pub(crate) fn summary(input: &ReportInput<'_>, color: bool) -> String {
     let mut room = MAX_LINES.saturating_sub(out.lines().count());
     let all = remarks(input);
     for (i, remark) in all.iter().enumerate() {
-        let left = all.len() - i;
+        let mut left = all.len() - i;
         let text = remark.lines(paint);
         let lines = text.lines().count();
         // A line stays free for the number of those left out.
         if lines + usize::from(left > 1) > room {
+            // The gravest is always told, be it cut.
+            if i == 0 && room > 1 {
+                out += &remark.clone().at_most(room - 1).lines(paint);
+                left -= 1;
+            }
             let text = format!("{left} more: see the report, or add -v");
             out += &Note::of(text).warning().lines(paint);
             break;
