@@ -10,7 +10,7 @@ use crate::closeups::Closeups;
 use crate::error::AnalysisError;
 use crate::indentation;
 use crate::input::{EventSource, SessionInput};
-use crate::judging_settings::JudgingSettings;
+use crate::judging_settings::{judging_input, take_findings};
 use crate::locate_presses::{
     CalibrationOrigin, LocatedPresses, locate_presses, locate_recalibrated,
 };
@@ -200,9 +200,12 @@ fn analyze_by(
         motion: None,
     };
     evaluate(&mut analysis, input, &streams, &kept)?;
-    if let Some(judging) = JudgingSettings::of(input, &analysis) {
-        let judged = analyze_by(&judging.input(input), source, Retention::Scored, origin);
-        judging.apply(&mut analysis, judged.ok().map(|(by, _)| by.findings));
+    let judging = judging_input(input, &analysis);
+    // If that analysis fails, the findings of this one stand.
+    if let Some(Ok((judged, _))) =
+        judging.map(|input| analyze_by(&input, source, Retention::Scored, origin))
+    {
+        take_findings(&mut analysis, judged.findings);
     }
     Ok((analysis, kept))
 }

@@ -168,6 +168,14 @@ fn settings_that_do_not_suit_a_recording_are_told() {
         i.settings.window_before_ms = 3_000.0;
     });
     assert!(told.is_some());
+    // A variant may correct what the recording's settings left out.
+    let mut input = input.clone();
+    let right = std::mem::replace(&mut input.settings.crop_v, [(0, 20); 2]);
+    assert!(!analyze(&input, &source).unwrap().is_valid());
+    input.recorded_settings = Some(input.settings.clone());
+    input.settings.crop_v = right;
+    let corrected = analyze(&input, &source).unwrap();
+    assert!(corrected.is_valid(), "{:?}", corrected.findings);
 }
 
 #[test]
