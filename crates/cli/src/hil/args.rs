@@ -42,7 +42,8 @@ pub(crate) enum HilCommand {
         Exit codes:\n  \
         0  nothing moved, or there are too few nights to say\n  \
         1  an alarm: something moved and is still off\n  \
-        2  bad input: no history, another program's file, a bench or series that it does not have\n\n\
+        2  bad input: no history, another program's file, a bench or series that it does not have\n  \
+        3  nothing moved, but --rebuild could not read all nights\n\n\
         docs/reference/nightly.md explains the rules for alarms and their false alarm rate."
     )]
     Trend(HilTrendArgs),

@@ -79,11 +79,11 @@ impl Rebuild {
     }
 }
 
-/// Adds the nights in the folders of `nights` to the history.
+/// Adds the nights in the folders of `nights` to the history; returns how many could not be read.
 ///
 /// # Errors
 /// [`Failure::input`] if `nights` has no finished night, or the history cannot be written.
-pub(super) fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
+pub(super) fn rebuild(path: &Path, nights: &Path) -> Result<usize, Failure> {
     let cannot = |e| Failure::input(format!("--rebuild: {}: {e}", nights.display()));
     let entries = std::fs::read_dir(nights).map_err(cannot)?;
     let entries = entries.map(|e| e.map(|e| e.path().join(night_folder::JSON)));
@@ -122,5 +122,5 @@ pub(super) fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
             nights.display()
         )));
     }
-    Ok(())
+    Ok(all.skipped)
 }

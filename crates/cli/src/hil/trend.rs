@@ -18,9 +18,10 @@ use crate::exit::{Exit, Failure, Outcome};
 /// [`Failure::input`] if the file is not a history, or lacks the bench or the series; [`Failure::internal`] if a file cannot be
 /// written.
 pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
-    if let Some(folder) = &args.rebuild {
-        super::rebuild::rebuild(&args.history, folder)?;
-    }
+    let skipped = match &args.rebuild {
+        Some(folder) => super::rebuild::rebuild(&args.history, folder)?,
+        None => 0,
+    };
     let (history, report) = judge_history(args)?;
     let pattern = args.series.as_deref().unwrap_or("*");
     let series = series(pattern).map_err(|e| {
@@ -65,10 +66,15 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
         }
     }
     let is_steady = report.alarms.is_empty() && report.unmeasured().next().is_none();
-    Ok(Exit::Night(if is_steady {
-        NightExit::Pass
-    } else {
-        NightExit::Fail
+    if skipped > 0 {
+        errln!(
+            "warning: the trends leave out {skipped} nights that could not be read, named above"
+        );
+    }
+    Ok(Exit::Night(match (is_steady, skipped) {
+        (true, 0) => NightExit::Pass,
+        (true, _) => NightExit::Infrastructure,
+        (false, _) => NightExit::Fail,
     }))
 }
 

@@ -44,8 +44,13 @@ fn a_variant_is_stored_beside_the_official_analysis_and_used_only_on_request() {
         "all",
     ])
     .code(0);
-    // Eight presses are too few for the public code's calibration, and nominal cameras give no result.
-    skinrig(&["analyze", &s, "--reference-code"]).code(4);
+    // Eight presses are too few for the public code's calibration, and its windows give hardly more than a guess: no fault of the
+    // session.
+    let output = skinrig(&["analyze", &s, "--reference-code"]).code(0);
+    assert!(
+        output.out.contains("looks faulty") && output.out.contains("unknown"),
+        "{output:#?}"
+    );
     let after = (
         std::fs::read(&official).unwrap(),
         std::fs::read(&report).unwrap(),

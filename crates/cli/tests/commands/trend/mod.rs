@@ -492,4 +492,13 @@ fn a_night_without_trends_gives_the_reason_and_is_still_judged() {
         .trend(&["--rebuild", &all])
         .code(0)
         .expect_stderr(&["2 nights added"]);
+    // Nothing moved in the nights that can be read says nothing about the others.
+    let damaged = nights.lab.path("nights").join("2099-01-03-damaged");
+    std::fs::create_dir(&damaged).unwrap();
+    std::fs::write(damaged.join("night.json"), "{").unwrap();
+    nights.trend(&["--rebuild", &all]).code(3).expect_stderr(&[
+        "skipped",
+        "2099-01-03-damaged",
+        "leave out 1 nights that could not be read",
+    ]);
 }
