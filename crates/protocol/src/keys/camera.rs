@@ -153,7 +153,7 @@ pub(crate) fn rays_meet(
     if points.is_empty() || largest >= least {
         return;
     }
-    out.error(field.span, field.path.as_str(), "the cameras see every location from one side")
+    out.error(field.span, field.path.as_str(), "the rays of the cameras are nearly parallel at every location")
         .expected(format!("rays of the two cameras that meet at a sine of at least {least} (`analysis.min_ray_sine`) somewhere"))
         .found(format!("at most {largest:.4}"))
         .help("place the cameras apart, as in `skinrig new own-cameras`");

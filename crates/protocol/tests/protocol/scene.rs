@@ -158,7 +158,7 @@ fn cameras_that_see_no_angles_are_refused() {
         "[45 mm, 42 mm]",
         &[
             "scene.cameras",
-            "from one side",
+            "nearly parallel at every location",
             "sine of at least 0.05",
             "at most 0.0000",
         ],
