@@ -30,11 +30,12 @@ use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, red
 
 /// Analyses a session. The first pass over a camera's events finds event rates and, where its clock is known before, hot pixels; the
 /// last one fills the press windows. Both cameras run in parallel. Later passes use cached events of the crop. Each reads
-/// them again if a camera has more than 2^25, or if some were too late for their windows.
+/// them again if a camera has more than 2^25, or if some were too late for their windows. Settings that see presses otherwise than the
+/// recording's, or that give a fault, cost a second analysis (`judging_settings`).
 ///
 /// The result is bit-identical for the same input on the same machine. Memory does not grow with the number of events,
-/// except for cached events (8 bytes each, at most 256 MiB per camera). It holds the rate histogram (4 bytes per
-/// `rate_bin_ms`), the table of presses, and one pixel grid per open window.
+/// except for cached events (8 bytes each, at most 256 MiB per camera). It holds rate histograms (4 bytes per 10 ms, and
+/// per `rate_bin_ms` if that differs), the table of presses, and one pixel grid per open window.
 ///
 /// # Errors
 /// When the input contradicts itself, a setting is out of range, or the events cannot be read. Problems with single presses

@@ -4,7 +4,7 @@
 use skinrig_model::AnalysisSettings;
 
 use crate::input::SessionInput;
-use crate::result::{Analysis, Finding, WarningCause};
+use crate::result::{Analysis, Fault, Finding, WarningCause};
 
 /// The session of another analysis, whose findings count. How presses are seen, by windows and clusters, is that of the recording for a
 /// variant of its analysis. For the recording's own settings it is the usual one, if the audit finds a fault: what they see of a press
@@ -27,15 +27,33 @@ pub(crate) fn judging_input(input: &SessionInput, analysis: &Analysis) -> Option
     })
 }
 
-/// Takes the findings of that analysis.
+/// Takes the findings of that analysis, unless this one sees what that one only fails to see: a variant may correct windows and clusters
+/// that suit no press.
 pub(crate) fn take_findings(analysis: &mut Analysis, judged: Vec<Finding>) {
-    let is_sound = judged.iter().all(|finding| !finding.invalidates);
-    let own = std::mem::replace(&mut analysis.findings, judged);
-    let faulty = own.iter().find(|finding| finding.invalidates);
-    if let Some(Finding { fault, .. }) = faulty.filter(|_| is_sound) {
+    let faults = |findings: &[Finding]| -> Vec<Fault> {
+        let faulty = findings.iter().filter(|finding| finding.invalidates);
+        faulty.map(|finding| finding.fault).collect()
+    };
+    let (own, others) = (faults(&analysis.findings), faults(&judged));
+    if corrects(&own, &others) {
+        return;
+    }
+    analysis.findings = judged;
+    if let Some(fault) = own.first().filter(|_| others.is_empty()) {
         let cause = WarningCause::UnsuitableSettings { fault: *fault };
         analysis.warnings.insert(0, cause.into());
     }
+}
+
+/// True if an analysis with the faults `own` sees what one with the faults `others` only fails to see.
+fn corrects(own: &[Fault], others: &[Fault]) -> bool {
+    let sees_nothing = |fault: &Fault| {
+        matches!(
+            fault,
+            Fault::Unknown | Fault::NotTouched | Fault::CameraBlind
+        )
+    };
+    own.is_empty() && !others.is_empty() && others.iter().all(sees_nothing)
 }
 
 /// The settings, seeing presses as `by` does; what counts, calibration, hot pixels, crop and limits stay.
@@ -59,5 +77,21 @@ fn as_seen_by(settings: &AnalysisSettings, by: &AnalysisSettings) -> AnalysisSet
         min_cluster_events: by.min_cluster_events,
         min_response_sigma: by.min_response_sigma,
         ..settings.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_seen_rebuts_only_what_is_not_seen() {
+        use Fault::{CameraBlind, UnitOfPositions, Unknown};
+        assert!(corrects(&[], &[Unknown]));
+        assert!(corrects(&[], &[CameraBlind, Unknown]));
+        // A definite fault stays, whatever other windows see.
+        assert!(!corrects(&[], &[Unknown, UnitOfPositions]));
+        assert!(!corrects(&[Unknown], &[Unknown]));
+        assert!(!corrects(&[], &[]));
     }
 }

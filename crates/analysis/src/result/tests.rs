@@ -252,8 +252,8 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
         ),
         (
             json!({"kind": "unsuitable_settings", "fault": "clock_wrong"}),
-            "with these settings of the analysis the session looks faulty (clock wrong), with the defaults it does not: they do not suit the \
-             recording",
+            "the analysis settings do not suit this recording: with them it looks faulty (clock wrong), with the usual windows and \
+             clusters it does not",
         ),
         (
             json!({"kind": "no_scored_press"}),

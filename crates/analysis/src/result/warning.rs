@@ -251,10 +251,10 @@ pub enum WarningCause {
         /// Their share of the idle events.
         idle_share: f64,
     },
-    /// The audit found a fault that disappears with the default settings.
+    /// The audit found a fault that disappears with the windows and clusters of the recording, or the default ones.
     #[error(
-        "with these settings of the analysis the session looks faulty ({}), with the defaults it does not: they do not suit the \
-         recording",
+        "the analysis settings do not suit this recording: with them it looks faulty ({}), with the usual windows and clusters it \
+         does not",
         .fault.name()
     )]
     UnsuitableSettings {

@@ -48,7 +48,8 @@ fn a_variant_is_stored_beside_the_official_analysis_and_used_only_on_request() {
     // session.
     let output = skinrig(&["analyze", &s, "--reference-code"]).code(0);
     assert!(
-        output.out.contains("looks faulty") && output.out.contains("unknown"),
+        output.out.contains("settings do not suit this recording")
+            && output.out.contains("unknown"),
         "{output:#?}"
     );
     let after = (
