@@ -4,7 +4,9 @@ use crate::support;
 use skinrig_analysis::result::AlignmentViolation;
 use skinrig_analysis::timebase::CameraClockError;
 use skinrig_model::CameraId;
-use skinrig_report::{JSON_VERSION, ReportInput, json, terminal_summary, terminal_table};
+use skinrig_report::{
+    JSON_VERSION, Provenance, ReportInput, Variant, json, terminal_summary, terminal_table,
+};
 
 #[test]
 fn terminal_table_reads_like_this() {
@@ -30,7 +32,7 @@ fn terminal_table_reads_like_this() {
 #[test]
 fn terminal_table_of_an_empty_session() {
     let analysis = support::empty();
-    let provenance = skinrig_report::Provenance {
+    let provenance = Provenance {
         run_end: "faulted".into(),
         run_end_reason: Some("camera 2 stopped answering".into()),
         ..Default::default()
@@ -182,11 +184,10 @@ fn json_document_has_this_layout() {
 #[test]
 fn the_summary_answers_first_in_few_lines() {
     let mut analysis = support::analysis(16, 10);
-    let provenance = support::provenance();
-    let summary = |analysis: &skinrig_analysis::Analysis| {
+    let summary_of = |analysis: &skinrig_analysis::Analysis, provenance: Provenance| {
         let input = ReportInput {
             analysis,
-            provenance: provenance.clone(),
+            provenance,
             tradeoff: None,
             scene: None,
         };
@@ -195,6 +196,7 @@ fn the_summary_answers_first_in_few_lines() {
         assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
         text
     };
+    let summary = |analysis: &_| summary_of(analysis, support::provenance());
     insta::assert_snapshot!("terminal_summary", summary(&analysis));
     analysis.warnings = (0..20)
         .map(|i| support::warning(format!("warning {i} {}", "long ".repeat(60))))
@@ -202,6 +204,24 @@ fn the_summary_answers_first_in_few_lines() {
     let many = summary(&analysis);
     assert!(many.starts_with("RMSE  "), "{many}");
     assert!(many.contains(" more: see the report"), "{many}");
+    // Where hardly a line is left, the gravest remark is cut, not left out.
+    let fault = skinrig_analysis::result::Fault::ClockWrong;
+    let grave = skinrig_analysis::result::WarningCause::UnsuitableSettings { fault };
+    analysis.warnings.push(grave.into());
+    let mut provenance = support::provenance();
+    provenance.variant = Some(Variant {
+        name: "v".to_owned(),
+        changed: vec!["analysis.window_before=3s".to_owned(); 3],
+        reference_code: false,
+        calibration_from: None,
+        selection: None,
+    });
+    let cut = summary_of(&analysis, provenance);
+    assert!(
+        cut.contains("warning   the analysis settings do not suit"),
+        "{cut}"
+    );
+    assert!(cut.contains(" more: see the report"), "{cut}");
     analysis.findings = support::studies::findings();
     let found = summary(&analysis);
     assert!(found.starts_with("FAULT     cameras swapped; "), "{found}");
