@@ -100,6 +100,18 @@ impl Address {
             Self::Server(_) => Ok(format!("{}:{}", computer(), folder.display())),
         }
     }
+
+    /// The folder that [`store_of`](Self::store_of) called `store`, if it is on this computer.
+    pub(crate) fn folder_of(&self, store: &str) -> Option<PathBuf> {
+        match self {
+            Self::File(file) if store.is_empty() => file.parent().map(Path::to_owned),
+            Self::File(_) => Some(store.into()),
+            Self::Server(_) => {
+                let path = store.strip_prefix(&computer())?.strip_prefix(':')?;
+                Some(path.into())
+            }
+        }
+    }
 }
 
 /// Name of this computer with a part of its identifier: two benches may have the same name.

@@ -103,6 +103,11 @@ impl Catalogue {
         self.address.store_of(folder)
     }
 
+    /// The folder of this name in this catalogue, if it is on this computer.
+    pub(crate) fn folder_of(&self, store: &str) -> Option<PathBuf> {
+        self.address.folder_of(store)
+    }
+
     /// Creates a catalogue, or reads every session of a folder into an existing one again. A damaged file is replaced.
     ///
     /// # Errors

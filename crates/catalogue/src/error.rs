@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use skinrig_nightly::trend::NoSuchNights;
 use skinrig_recorder::SESSION_SUFFIX;
 use skinrig_settings::Diagnostics;
 
@@ -121,6 +122,24 @@ pub enum CatalogueError {
     InvalidNight {
         /// The file.
         path: PathBuf,
+        /// What was found.
+        found: String,
+    },
+    /// The catalogue has no such nights.
+    #[error("{place}: {found}; `skinrig catalogue register --nights FOLDER` registers nights")]
+    NoNights {
+        /// The catalogue, without a password.
+        place: String,
+        /// What was expected and found.
+        found: NoSuchNights,
+    },
+    /// A column has a value that skinrig does not write.
+    #[error(
+        "catalogue: column `{column}`: expected what skinrig writes, found {found}; `skinrig catalogue rebuild` repairs it"
+    )]
+    InvalidColumn {
+        /// The column.
+        column: &'static str,
         /// What was found.
         found: String,
     },

@@ -27,6 +27,7 @@ mod results_error;
 mod roles;
 mod schema;
 mod status;
+mod trends;
 mod value;
 mod write;
 
@@ -47,4 +48,5 @@ pub use results::{
 pub use results_error::ResultsError;
 pub use roles::{ROLES, Role};
 pub use status::{FolderStatus, StaleFile, Staleness, Unreadable};
+pub use trends::CatalogueNights;
 pub use value::Value;

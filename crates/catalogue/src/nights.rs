@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use skinrig_nightly::{Night, unsound};
+use skinrig_nightly::judge::part_verdicts;
+use skinrig_nightly::trend::Acceptance;
+use skinrig_nightly::{CheckResult, Night, unsound};
 
 use crate::catalogue::Catalogue;
 use crate::db::Db;
@@ -62,6 +64,40 @@ impl Catalogue {
             }
         }
         Ok(done)
+    }
+
+    /// Replaces the accepted changes of a folder of nights by those of its history, each with the name of its bench.
+    ///
+    /// # Errors
+    /// If the folder cannot be found, or the catalogue not written.
+    pub fn replace_acceptances(
+        &mut self,
+        nights: &Path,
+        all: &[(String, Acceptance)],
+    ) -> Result<(), CatalogueError> {
+        let store = self.store_of(nights)?;
+        self.transaction("registering accepted changes", async |db| {
+            let sql = "DELETE FROM night_acceptance WHERE store = $1";
+            db.execute(sql, &[(&store).into()]).await?;
+            for (position, (rig, accepted)) in (1_u32..).zip(all) {
+                db.execute(
+                    "INSERT INTO night_acceptance (store, position, rig, night_id, series, reason, accepted_by, accepted_at)
+                     VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+                    &[
+                        (&store).into(),
+                        position.into(),
+                        rig.into(),
+                        (&accepted.night).into(),
+                        (&accepted.series).into(),
+                        (&accepted.reason).into(),
+                        (&accepted.by).into(),
+                        (&accepted.at).into(),
+                    ],
+                )
+                .await?;
+            }
+            Ok(())
+        })
     }
 }
 
@@ -123,7 +159,7 @@ enum Inserted {
 async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<Inserted, sqlx::Error> {
     let sha256 = digest(night);
     db.lock(&sha256).await?;
-    let sql = "DELETE FROM night WHERE folder = $1 AND sha256 <> $2";
+    let sql = "DELETE FROM night WHERE (folder = $1 AND sha256 <> $2) OR (sha256 = $2 AND suite_sha256 IS NULL)";
     db.execute(sql, &[folder.into(), (&sha256).into()]).await?;
     let sql = "SELECT sha256 FROM night WHERE rig = $1 AND rig_kind = $2 AND night_id = $3 AND sha256 <> $4";
     let named = [
@@ -135,7 +171,14 @@ async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<Inserted, sq
     if !db.fetch(sql, &named).await?.rows.is_empty() {
         return Ok(Inserted::Conflicting);
     }
-    let values: [Bound; 12] = [
+    let firmware = serde_json::Value::from_iter(
+        night
+            .versions
+            .firmware
+            .iter()
+            .map(|(device, version)| [device.as_str(), version.as_str()]),
+    );
+    let values: [Bound; 16] = [
         (&sha256).into(),
         (&night.id).into(),
         (&night.rig).into(),
@@ -148,12 +191,16 @@ async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<Inserted, sq
         (&night.versions.skin).into(),
         night.verdict.name().into(),
         folder.into(),
+        (&night.suite_sha256).into(),
+        (&night.rig_sha256).into(),
+        night.golden.as_ref().map(|g| g.session.as_str()).into(),
+        (&firmware.to_string()).into(),
     ];
     let added = db
         .execute(
             "INSERT INTO night (sha256, night_id, rig, rig_kind, suite, started_at, started_s, software, analysis, skin, verdict,
-                 folder)
-             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12) ON CONFLICT (sha256) DO NOTHING",
+                 folder, suite_sha256, rig_sha256, golden, firmware_json)
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16) ON CONFLICT (sha256) DO NOTHING",
             &values,
         )
         .await?;
@@ -161,25 +208,43 @@ async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<Inserted, sq
         return Ok(Inserted::Known);
     }
     for check in &night.checks {
-        let parts = check.attempts.last().map(|a| a.parts.as_slice());
-        for part in parts.unwrap_or_default() {
-            for m in &part.measurements {
-                db.execute(
-                    "INSERT INTO night_value (sha256, check_name, subject, metric, value, unit, verdict)
-                     VALUES ($1, $2, $3, $4, $5, $6, $7)",
-                    &[
-                        (&sha256).into(),
-                        (&check.name).into(),
-                        (&part.subject).into(),
-                        (&m.metric).into(),
-                        m.value.into(),
-                        (&m.unit).into(),
-                        m.verdict.name().into(),
-                    ],
-                )
-                .await?;
-            }
-        }
+        insert_values(db, &sha256, check).await?;
     }
     Ok(Inserted::New)
+}
+
+/// Inserts what the last attempt at a check measured.
+async fn insert_values(db: &mut Db, sha256: &str, check: &CheckResult) -> Result<(), sqlx::Error> {
+    let Some(last) = check.attempts.last() else {
+        return Ok(());
+    };
+    for (part, judged) in last.parts.iter().zip(part_verdicts(check, last)) {
+        for m in &part.measurements {
+            let (limit, interval) = (m.limit.as_ref(), m.interval);
+            db.execute(
+                "INSERT INTO night_value (sha256, check_name, subject, metric, value, unit, verdict, at_least, at_most, margin, low,
+                     high, n, part_verdict, attempts)
+                 VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15)",
+                &[
+                    sha256.into(),
+                    (&check.name).into(),
+                    (&part.subject).into(),
+                    (&m.metric).into(),
+                    m.value.into(),
+                    (&m.unit).into(),
+                    m.verdict.name().into(),
+                    limit.and_then(|l| l.at_least).into(),
+                    limit.and_then(|l| l.at_most).into(),
+                    limit.map(|l| l.margin).into(),
+                    interval.map(|[low, _]| low).into(),
+                    interval.map(|[_, high]| high).into(),
+                    m.n.into(),
+                    judged.name().into(),
+                    u64::try_from(check.attempts.len()).unwrap_or(u64::MAX).into(),
+                ],
+            )
+            .await?;
+        }
+    }
+    Ok(())
 }

@@ -17,12 +17,12 @@ BEGIN
     GRANT skinrig_admin TO CURRENT_USER;
 
     GRANT SELECT ON session, session_file, unreadable_file, leg, press_fault, device, analysis, clock_fit, calibration,
-        calibration_value, press, tag, note, night, night_value, prototype, _sqlx_migrations TO skinrig_read;
+        calibration_value, press, tag, note, night, night_value, night_acceptance, prototype, _sqlx_migrations TO skinrig_read;
 
     GRANT INSERT, DELETE ON tag, note TO skinrig_annotate;
 
     GRANT INSERT, UPDATE, DELETE ON session, session_file, unreadable_file, leg, press_fault, device, analysis, clock_fit, calibration,
-        calibration_value, press, tag, note, night, night_value, prototype TO skinrig_record;
+        calibration_value, press, tag, note, night, night_value, night_acceptance, prototype TO skinrig_record;
 
     ALTER TABLE session OWNER TO skinrig_admin;
     ALTER TABLE session_file OWNER TO skinrig_admin;
@@ -39,6 +39,7 @@ BEGIN
     ALTER TABLE note OWNER TO skinrig_admin;
     ALTER TABLE night OWNER TO skinrig_admin;
     ALTER TABLE night_value OWNER TO skinrig_admin;
+    ALTER TABLE night_acceptance OWNER TO skinrig_admin;
     ALTER TABLE prototype OWNER TO skinrig_admin;
     ALTER TABLE _sqlx_migrations OWNER TO skinrig_admin;
 END $$

@@ -6,7 +6,7 @@ use sqlx::{Connection, SqlSafeStr};
 use crate::db::Db;
 
 /// All migrations, oldest first: version, description and SQL.
-pub(crate) const MIGRATIONS: [(i64, &str, &str); 3] = [
+pub(crate) const MIGRATIONS: [(i64, &str, &str); 4] = [
     (
         20261127000000,
         "catalogue",
@@ -21,6 +21,11 @@ pub(crate) const MIGRATIONS: [(i64, &str, &str); 3] = [
         20261129000000,
         "left out",
         include_str!("../../../migrations/catalogue/20261129000000_left_out.sql"),
+    ),
+    (
+        20261130000000,
+        "trends",
+        include_str!("../../../migrations/catalogue/20261130000000_trends.sql"),
     ),
 ];
 

@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 use skinrig_analysis::Analysis;
 use skinrig_catalogue::ListedAnalysis;
 use skinrig_controller::State;
-use skinrig_hil::history::{self, Filter};
+use skinrig_hil::history::{self, HISTORY_FILE};
+use skinrig_nightly::trend::Filter;
 use skinrig_recorder::{SessionState, SessionSummary};
 use skinrig_view::{
     AnalysisEntry, Lab, LabError, NewestBytes, Options, RunState, Server, SettingDifference,
@@ -218,7 +219,7 @@ impl Lab for Program {
     }
 
     fn nights(&self, folder: &Path) -> Result<Vec<Value>, LabError> {
-        let path = folder.join("nights/history.sqlite");
+        let path = folder.join("nights").join(HISTORY_FILE);
         if !path.is_file() {
             return Ok(Vec::new());
         }

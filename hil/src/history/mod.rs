@@ -5,20 +5,23 @@
 mod error;
 mod file;
 mod read;
-mod suite_nights;
 mod write;
 
-pub use self::suite_nights::SuiteNights;
 use std::path::{Path, PathBuf};
 
 use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::trend::derived::RATIOS;
-use skinrig_nightly::trend::{Acceptance, History, NightSummary, Series};
+use skinrig_nightly::trend::{
+    Acceptance, Filter, History, NightSummary, NoSuchNights, Series, SuiteNights,
+};
 use skinrig_nightly::{Night, unsound};
 use tokio::runtime::Runtime;
 
 pub use error::HistoryError;
 use error::QueryError;
+
+/// Usual name of the history in a folder of nights.
+pub const HISTORY_FILE: &str = "history.sqlite";
 
 /// Result of adding a night.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,17 +30,6 @@ pub enum AppendOutcome {
     Added,
     /// The history already had it.
     AlreadyPresent,
-}
-
-/// Selects nights. Empty fields match the newest night.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Filter {
-    /// Name of the bench.
-    pub rig: Option<String>,
-    /// Name of the suite.
-    pub suite: Option<String>,
-    /// `bench` or `emulated`.
-    pub rig_kind: Option<String>,
 }
 
 /// Adds a night, whose files are in `folder`, to the history at `path`, and creates the history if needed. Atomic; adding the same
@@ -146,31 +138,27 @@ pub fn suites(path: &Path) -> Result<Vec<SuiteNights>, HistoryError> {
 /// Those of [`suites`], and [`HistoryError::NotFound`] if no night matches.
 pub fn load(path: &Path, filter: &Filter) -> Result<History, HistoryError> {
     let suites = suites(path)?;
-    let matches = |line: &&SuiteNights| {
-        filter.rig.as_ref().is_none_or(|rig| *rig == line.rig)
-            && filter.suite.as_ref().is_none_or(|s| *s == line.suite)
-            && filter.rig_kind.as_ref().is_none_or(|k| *k == line.rig_kind)
+    let not_found = |none: NoSuchNights| HistoryError::NotFound {
+        path: path.to_owned(),
+        expected: none.expected,
+        found: none.found,
     };
-    let Some(line) = suites.iter().find(matches) else {
-        let each = suites.iter().map(|l| format!("{} on {}", l.suite, l.rig));
-        let found = each.collect::<Vec<_>>().join(", ");
-        return Err(HistoryError::NotFound {
-            path: path.to_owned(),
-            expected: format!(
-                "nights of {} on {}",
-                filter.suite.as_deref().unwrap_or("any suite"),
-                filter.rig.as_deref().unwrap_or("any bench")
-            ),
-            found: if found.is_empty() {
-                "no nights".to_owned()
-            } else {
-                found
-            },
-        });
-    };
+    let line = filter.choose(&suites).map_err(not_found)?;
     runtime(path)?.block_on(async {
         let mut conn = file::open(path, false).await?;
         let read = read::history(&mut conn, line).await;
+        read.map_err(|fault| fault.at(path, "reading it"))
+    })
+}
+
+/// All accepted changes in the history, each with the name of its bench.
+///
+/// # Errors
+/// Those of [`suites`].
+pub fn acceptances(path: &Path) -> Result<Vec<(String, Acceptance)>, HistoryError> {
+    runtime(path)?.block_on(async {
+        let mut conn = file::open(path, false).await?;
+        let read = read::acceptances(&mut conn).await;
         read.map_err(|fault| fault.at(path, "reading it"))
     })
 }

@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 
 use skinrig_model::Limit;
-use skinrig_nightly::trend::{Acceptance, History, NightSummary, Point, Series};
+use skinrig_nightly::trend::{Acceptance, History, NightSummary, Point, Series, SuiteNights};
 use skinrig_nightly::{Verdict, Versions};
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use super::error::QueryError;
-use super::suite_nights::SuiteNights;
 
 /// The suites in the history, the one with the newest night first.
 pub(super) async fn suites(conn: &mut SqliteConnection) -> Result<Vec<SuiteNights>, QueryError> {
@@ -61,20 +60,30 @@ pub(super) async fn history(
         }
     }
     points(conn, None, &index, &mut all).await?;
-    let rows = sqlx::query("SELECT * FROM acceptance WHERE rig = ? ORDER BY id")
-        .bind(&of.rig)
+    let accepted = acceptances(conn).await?.into_iter();
+    let own = accepted.filter(|(rig, _)| *rig == of.rig);
+    all.accepted.extend(own.map(|(_, accepted)| accepted));
+    Ok(all)
+}
+
+/// All accepted changes, each with the name of its bench.
+pub(super) async fn acceptances(
+    conn: &mut SqliteConnection,
+) -> Result<Vec<(String, Acceptance)>, QueryError> {
+    let rows = sqlx::query("SELECT * FROM acceptance ORDER BY id")
         .fetch_all(conn)
         .await?;
-    for row in &rows {
-        all.accepted.push(Acceptance {
+    let accepted = |row: &SqliteRow| {
+        let accepted = Acceptance {
             series: row.try_get("series")?,
             night: row.try_get("night_id")?,
             reason: row.try_get("reason")?,
             by: row.try_get("by")?,
             at: row.try_get("at")?,
-        });
-    }
-    Ok(all)
+        };
+        Ok((row.try_get("rig")?, accepted))
+    };
+    rows.iter().map(accepted).collect()
 }
 
 /// One night, without its firmware, and its series.

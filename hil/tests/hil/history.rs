@@ -4,10 +4,10 @@
 
 use std::path::Path;
 
-use skinrig_hil::history::{AppendOutcome, Filter, HistoryError, accept, append, load, suites};
+use skinrig_hil::history::{AppendOutcome, HistoryError, accept, append, load, suites};
 use skinrig_model::{Limit, Notification, NotificationChannel, Occasion};
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
-use skinrig_nightly::trend::{Acceptance, History};
+use skinrig_nightly::trend::{Acceptance, Filter, History};
 use skinrig_nightly::{GoldenSession, Night, NightExit, Verdict, Versions};
 
 fn measured(metric: &str, value: Option<f64>) -> Measurement {

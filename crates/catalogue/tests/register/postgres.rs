@@ -1,10 +1,11 @@
 //! The same catalogue on a PostgreSQL server.
 
 use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError, Question};
+use skinrig_nightly::trend::Filter;
 
 use crate::server::Server;
 use crate::support::{Lab, WAIT};
-use crate::{questions, sessions, synthetic};
+use crate::{nights, questions, sessions, synthetic};
 
 /// Each role may do what its words say, and nothing of the next one.
 #[test]
@@ -133,6 +134,16 @@ fn a_server_gives_the_answers_of_the_embedded_catalogue() {
             .unwrap();
         assert_eq!(nights.registered, 20);
         catalogue.add(&synthetic::sessions(200, 5)).unwrap();
+        let accepted = [nights::accepted(None)];
+        catalogue
+            .replace_acceptances(other.path(), &accepted)
+            .unwrap();
+        let mut expected = nights::history(&other.path().join("nights"));
+        expected.accepted = accepted.map(|(_, accepted)| accepted).into();
+        assert_eq!(
+            catalogue.nights(&Filter::default()).unwrap().history,
+            expected
+        );
     }
     for question in Question::all() {
         let all = question.parameters.iter().find(|p| p.name == "limit");

@@ -51,7 +51,7 @@ impl Lab {
 }
 
 /// All tables of a catalogue but that of the migrations.
-pub(crate) const TABLES: [&str; 16] = [
+pub(crate) const TABLES: [&str; 17] = [
     "SELECT * FROM session",
     "SELECT * FROM session_file",
     "SELECT * FROM unreadable_file",
@@ -67,6 +67,7 @@ pub(crate) const TABLES: [&str; 16] = [
     "SELECT * FROM note",
     "SELECT * FROM night",
     "SELECT * FROM night_value",
+    "SELECT * FROM night_acceptance",
     "SELECT * FROM prototype",
 ];
 

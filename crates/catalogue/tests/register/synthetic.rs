@@ -10,9 +10,9 @@ use skinrig_catalogue::{
     AnalysisEntry, AnalysisFigures, CalibrationEntry, ClockEntry, EstimateEntry, LegEntry,
     NoteEntry, PressEntry, ResultsError, SessionEntry,
 };
-use skinrig_model::{CameraId, PressRole, Verdict as PressVerdict};
+use skinrig_model::{CameraId, Limit, PressRole, Verdict as PressVerdict};
 use skinrig_nightly::night::{Attempt, CheckResult, Measurement, Part, Versions};
-use skinrig_nightly::{Night, NightExit, Verdict};
+use skinrig_nightly::{GoldenSession, Night, NightExit, Verdict};
 use skinrig_recorder::{Headline, PressTally, SessionTotals};
 
 /// 2024-01-01.
@@ -284,10 +284,10 @@ fn night(started: &str, jitter_us: f64) -> Night {
             metric: "jitter".into(),
             value: Some(jitter_us),
             unit: "us".into(),
-            interval: None,
+            interval: Some([jitter_us - 0.1, jitter_us + 0.2]),
             n: Some(40),
             needs: 10,
-            limit: None,
+            limit: (subject == "camera1").then(|| Limit::at_most(1e6).with_margin(0.3)),
             verdict: Verdict::Pass,
             note: None,
         }],
@@ -310,7 +310,11 @@ fn night(started: &str, jitter_us: f64) -> Night {
         rig: "bench 1".into(),
         rig_kind: "bench".into(),
         rig_sha256: "0".repeat(64),
-        versions: Versions::default(),
+        versions: Versions {
+            firmware: vec![("camera1".into(), "3.9 \"b\"".into())],
+            skin: Some("golden skin".into()),
+            ..Versions::default()
+        },
         started: started.to_owned(),
         took_s: 1.0,
         planned_s: 1.0,
@@ -330,7 +334,11 @@ fn night(started: &str, jitter_us: f64) -> Night {
             rule: None,
             witnesses: Vec::new(),
         }],
-        golden: None,
+        golden: Some(GoldenSession {
+            session: "golden.session.sqlite".into(),
+            report: None,
+            results_sha256: None,
+        }),
         verdict: Verdict::Pass,
         exit: NightExit::Pass,
         notifications: Vec::new(),

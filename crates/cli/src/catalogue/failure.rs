@@ -7,10 +7,10 @@ use skinrig_catalogue::CatalogueError;
 use crate::exit::Failure;
 
 /// How long a command waits for another program that writes the catalogue. A write takes milliseconds.
-pub(super) const WAIT: Duration = Duration::from_secs(30);
+pub(crate) const WAIT: Duration = Duration::from_secs(30);
 
 /// Bad input, unless the machine or the database failed.
-pub(super) fn failure(error: CatalogueError) -> Failure {
+pub(crate) fn failure(error: CatalogueError) -> Failure {
     match &error {
         CatalogueError::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
             Failure::input(error)

@@ -10,11 +10,12 @@ use std::path::{Path, PathBuf};
 use skinrig_catalogue::{
     Access, Address, Catalogue, FolderStatus, NightRegistration, ROLES, Registration, Unreadable,
 };
+use skinrig_hil::history::{self, HISTORY_FILE};
 
 use self::args::{
     CatalogueArgs, CatalogueCommand, FolderArgs, RegisterArgs, RolesArgs, StatusArgs,
 };
-use self::failure::{WAIT, failure};
+pub(crate) use self::failure::{WAIT, failure};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::folder_of;
 
@@ -153,8 +154,8 @@ fn finish(
     nights: Option<&Path>,
     json: bool,
 ) -> Result<(), Failure> {
-    let nights = nights.map(|folder| catalogue.register_nights(folder));
-    let nights = nights.transpose().map_err(failure)?;
+    let nights = nights.map(|folder| register_nights(&mut catalogue, folder));
+    let nights = nights.transpose()?;
     let place = catalogue.place().to_owned();
     catalogue.close().map_err(failure)?;
     if json {
@@ -165,6 +166,24 @@ fn finish(
         print_registration(&place, done, nights.as_ref());
     }
     Ok(())
+}
+
+/// Registers the nights in a folder, and the changes accepted in the history there.
+fn register_nights(catalogue: &mut Catalogue, folder: &Path) -> Result<NightRegistration, Failure> {
+    let mut done = catalogue.register_nights(folder).map_err(failure)?;
+    let history = folder.join(HISTORY_FILE);
+    if history.is_file() {
+        match history::acceptances(&history) {
+            Ok(all) => catalogue
+                .replace_acceptances(folder, &all)
+                .map_err(failure)?,
+            Err(e) => done.unreadable.push(Unreadable {
+                file: history.display().to_string(),
+                reason: e.to_string(),
+            }),
+        }
+    }
+    Ok(done)
 }
 
 fn print_registration(place: &str, done: &Registration, nights: Option<&NightRegistration>) {

@@ -1,8 +1,8 @@
 //! `skinrig hil accept`: records that an operator accepts a change, with a reason.
 
 use chrono::{SecondsFormat, Utc};
-use skinrig_hil::history::{self, Filter};
-use skinrig_nightly::trend::Acceptance;
+use skinrig_hil::history;
+use skinrig_nightly::trend::{Acceptance, Filter};
 
 use super::args::HilAcceptArgs;
 use crate::exit::{Exit, Failure, Outcome};

@@ -23,6 +23,12 @@ pub(crate) enum MissingEvidence {
         /// The session.
         session: PathBuf,
     },
+    /// The folder of the night is not on this computer, or has no such file.
+    #[error("{session}: not on this computer")]
+    Elsewhere {
+        /// The session.
+        session: String,
+    },
     /// The session cannot be read.
     #[error(transparent)]
     Session(#[from] RecorderError),
@@ -66,6 +72,28 @@ pub(super) fn keep(history: &Path, report: &Report) -> Vec<AlarmEvidence> {
         }
     };
     report.alarms.iter().map(preserve).collect()
+}
+
+/// Looks for the session of every alarm in the folder of its night, which may be on another computer. Returns one entry per alarm.
+pub(super) fn find(report: &Report) -> Vec<AlarmEvidence> {
+    let look = |alarm: &Alarm| {
+        let night = &report.nights[alarm.raised];
+        let home = PathBuf::from(&night.folder);
+        let page = home.join(night_folder::PAGE);
+        let session = match night.golden.as_ref().map(|golden| home.join(golden)) {
+            None => Err(MissingEvidence::NoGolden),
+            Some(session) if session.is_file() => Ok(session),
+            Some(session) => Err(MissingEvidence::Elsewhere {
+                session: session.display().to_string(),
+            }),
+        };
+        AlarmEvidence {
+            page: page.is_file().then_some(page),
+            session,
+            home,
+        }
+    };
+    report.alarms.iter().map(look).collect()
 }
 
 /// Links or copies a sealed session into `folder`, unless it is there already.

@@ -1,5 +1,6 @@
 //! The command line of `skinrig hil`.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -102,9 +103,12 @@ pub(crate) struct HilRunArgs {
 /// Arguments of `hil trend`.
 #[derive(Debug, Args)]
 pub(crate) struct HilTrendArgs {
-    /// The history of nights.
-    #[arg(default_value = "nights/history.sqlite")]
-    pub history: PathBuf,
+    /// The history of nights [default: nights/history.sqlite, or the catalogue that SKINRIG_CATALOGUE names].
+    pub history: Option<PathBuf>,
+
+    /// Judge the nights of this catalogue: a file, or `postgres://USER@HOST/DATABASE`. `catalogue register --nights` registers them.
+    #[arg(long, value_name = "ADDRESS", conflicts_with_all = ["history", "rebuild"])]
+    pub catalogue: Option<OsString>,
 
     /// Show only series whose name contains this, or matches it entirely if it has a `*`. All series are still judged.
     #[arg(long, value_name = "PATTERN")]

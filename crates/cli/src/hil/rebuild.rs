@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use chrono::{SecondsFormat, Utc};
-use skinrig_hil::history::{self, AppendOutcome, HistoryError, SuiteNights};
+use skinrig_hil::history::{self, AppendOutcome, HistoryError};
 use skinrig_hil::night_folder;
 use skinrig_nightly::Night;
+use skinrig_nightly::trend::SuiteNights;
 
 use crate::exit::Failure;
 

@@ -1,28 +1,33 @@
 //! `skinrig hil trend`: metrics that changed over the nights, since when, and the probable cause.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use glob::{Pattern, PatternError};
-use skinrig_hil::history::{self, Filter, HistoryError};
-use skinrig_nightly::trend::{Acceptance, Alarm, History, Report, judge};
+use skinrig_catalogue::{Access, Address, Catalogue};
+use skinrig_hil::history::{self, HISTORY_FILE, HistoryError};
+use skinrig_nightly::trend::{Acceptance, Alarm, Filter, History, Report, SuiteNights, judge};
 use skinrig_nightly::{Night, NightExit};
 use skinrig_report::trend::{Links, Style, page, terminal};
 
 use super::alarms;
 use super::args::HilTrendArgs;
+use crate::catalogue::{WAIT, failure};
 use crate::exit::{Exit, Failure, Outcome};
 
 /// `skinrig hil trend`.
 ///
 /// # Errors
-/// [`Failure::input`] if the file is not a history, or lacks the bench or the series; [`Failure::internal`] if a file cannot be
-/// written.
+/// [`Failure::input`] if the file is not a history or a catalogue, or lacks the bench or the series; [`Failure::internal`] if a file
+/// cannot be written.
 pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
-    let skipped = match &args.rebuild {
-        Some(folder) => super::rebuild::rebuild(&args.history, folder)?,
-        None => 0,
+    let source = Source::of(args);
+    let skipped = match (&source, &args.rebuild) {
+        (Source::History(file), Some(folder)) => super::rebuild::rebuild(file, folder)?,
+        _ => 0,
     };
-    let (history, report) = judge_history(args)?;
+    let Nights { history, outdated } = nights(args, &source)?;
+    let report = judge(&history);
     let pattern = args.series.as_deref().unwrap_or("*");
     let series = series(pattern).map_err(|e| {
         Failure::input(format!(
@@ -37,7 +42,10 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
             report.charts.len()
         )));
     }
-    let alarm_links = alarms::keep(&args.history, &report);
+    let alarm_links = match &source {
+        Source::History(file) => alarms::keep(file, &report),
+        Source::Catalogue(_) => alarms::find(&report),
+    };
     if let Some(file) = &args.html {
         let links: Vec<Links> = alarm_links.iter().map(|k| k.links(file.parent())).collect();
         let html = page(&report, &links, &history.accepted);
@@ -71,34 +79,84 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
             "warning: the trends leave out {skipped} nights that could not be read, named above"
         );
     }
-    Ok(Exit::Night(match (is_steady, skipped) {
+    if outdated > 0 {
+        errln!(
+            "warning: the trends leave out {outdated} nights that an earlier version registered\n  \
+             next: `skinrig catalogue register --nights FOLDER` with the folder of these nights"
+        );
+    }
+    Ok(Exit::Night(match (is_steady, skipped + outdated) {
         (true, 0) => NightExit::Pass,
         (true, _) => NightExit::Infrastructure,
         (false, _) => NightExit::Fail,
     }))
 }
 
-fn judge_history(args: &HilTrendArgs) -> Result<(History, Report), Failure> {
+/// Where the nights are.
+enum Source {
+    /// A history file.
+    History(PathBuf),
+    /// A catalogue.
+    Catalogue(Address),
+}
+
+/// Nights of a suite on a bench.
+struct Nights {
+    history: History,
+    /// Number of nights that are left out because an earlier version registered them.
+    outdated: usize,
+}
+
+impl Source {
+    /// What the arguments name, else the catalogue that the environment names, else the usual history.
+    fn of(args: &HilTrendArgs) -> Self {
+        let of_environment = || std::env::var_os("SKINRIG_CATALOGUE").filter(|a| !a.is_empty());
+        let address = |text: OsString| Self::Catalogue(Address::parse(&text));
+        match (&args.catalogue, &args.history, &args.rebuild) {
+            (Some(named), _, _) => address(named.clone()),
+            (None, Some(file), _) => Self::History(file.clone()),
+            (None, None, None) => of_environment().map_or_else(Self::usual, address),
+            (None, None, Some(_)) => Self::usual(),
+        }
+    }
+
+    fn usual() -> Self {
+        Self::History(Path::new("nights").join(HISTORY_FILE))
+    }
+}
+
+/// The nights to judge; says which these are, and which not, if several suites and benches match the arguments.
+fn nights(args: &HilTrendArgs, source: &Source) -> Result<Nights, Failure> {
     let filter = Filter {
         rig: args.rig.clone(),
         suite: args.suite.clone(),
         ..Filter::default()
     };
-    let history = history::load(&args.history, &filter).map_err(Failure::input)?;
-    let report = judge(&history);
-    name_others(args)?;
-    Ok((history, report))
+    let (nights, suites) = match source {
+        Source::History(file) => {
+            let history = history::load(file, &filter).map_err(Failure::input)?;
+            let suites = history::suites(file).map_err(Failure::input)?;
+            let outdated = 0;
+            (Nights { history, outdated }, suites)
+        }
+        Source::Catalogue(address) => {
+            let mut catalogue =
+                Catalogue::open(address.clone(), Access::Read, WAIT).map_err(failure)?;
+            let found = catalogue.nights(&filter).map_err(failure)?;
+            let suites = catalogue.suites().map_err(failure)?;
+            catalogue.close().map_err(failure)?;
+            let (history, outdated) = (found.history, found.outdated);
+            (Nights { history, outdated }, suites)
+        }
+    };
+    name_others(&filter, &suites);
+    Ok(nights)
 }
 
-/// Says which nights are judged, and which are not, if several suites and benches match the arguments.
-fn name_others(args: &HilTrendArgs) -> Result<(), Failure> {
-    let suites = history::suites(&args.history).map_err(Failure::input)?;
-    let wanted = |asked: &Option<String>, name: &String| asked.as_ref().is_none_or(|a| a == name);
-    let matching = suites
-        .iter()
-        .filter(|s| wanted(&args.rig, &s.rig) && wanted(&args.suite, &s.suite));
+fn name_others(filter: &Filter, suites: &[SuiteNights]) {
+    let matching = suites.iter().filter(|suite| filter.matches(suite));
     let each: Vec<String> = matching
-        .map(|s| format!("{} on {} ({} nights)", s.suite, s.rig, s.nights))
+        .map(|suite| format!("{suite} ({} nights)", suite.nights))
         .collect();
     if let Some((judged, others @ [_, ..])) = each.split_first() {
         errln!(
@@ -106,7 +164,6 @@ fn name_others(args: &HilTrendArgs) -> Result<(), Failure> {
             others.join(", ")
         );
     }
-    Ok(())
 }
 
 /// Pattern for series names: with `*` it matches the whole name, otherwise any part of it.

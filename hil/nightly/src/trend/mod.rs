@@ -14,6 +14,7 @@ pub mod history;
 pub mod reference;
 pub mod report;
 pub mod run_length;
+mod suites;
 
 pub use cause::Attribution;
 pub use change::ChangeWindow;
@@ -21,3 +22,4 @@ pub use chart::{Chart, ChartPoint, Direction, Excursion, SeriesState, chart};
 pub use history::{Acceptance, History, NightSummary, Point, Series};
 pub use reference::Reference;
 pub use report::{Alarm, Report, judge};
+pub use suites::{Filter, NoSuchNights, SuiteNights};

@@ -9,7 +9,7 @@ use skinrig_model::Occasion;
 use skinrig_nightly::{Night, NightExit, Verdict};
 
 use crate::servers::http;
-use crate::support::{files, only, skinrig, text};
+use crate::support::{ProgramOutput, files, only, program, run_to_end, skinrig, text};
 use nights::Nights;
 
 /// Name of the series [`EVENTS`] on pages.
@@ -295,6 +295,84 @@ fn an_accepted_change_restarts_the_reference_and_records_author_and_reason() {
         &nights.trend(&[]).code(0).out,
         &["too few nights for trends: 4 of the 12"],
     );
+}
+
+#[test]
+fn the_nights_of_a_catalogue_are_judged_like_those_of_a_history() {
+    let nights = Nights {
+        with_json: true,
+        ..Nights::new()
+    };
+    let session = nights.lab.record("s", &[]);
+    nights.add(0..36, 36, None);
+    nights.add(36..40, 36, Some(&session));
+    let lab = &nights.lab;
+    let (sessions, folder) = (lab.text("sessions"), lab.text("nights"));
+    std::fs::create_dir_all(&sessions).unwrap();
+    let register = || {
+        let registered = ["catalogue", "register", &sessions, "--nights", &folder];
+        skinrig(&registered).code(0)
+    };
+    let first = register();
+    assert_contains(&first.out, &["nights      40 added, 0 unchanged"]);
+    let catalogue = lab.text("sessions/catalogue.sqlite");
+    let of_catalogue =
+        |more: &[&str]| skinrig(&[&["hil", "trend", "--catalogue", &catalogue], more].concat());
+    // Folders and copies of sessions have other paths.
+    let judged = |output: ProgramOutput| {
+        let mut report = output.json();
+        for night in report["nights"].as_array_mut().unwrap() {
+            night["folder"].take();
+        }
+        let sessions = report["sessions"].take();
+        (report, sessions)
+    };
+    let (own, copies) = judged(nights.trend(&["--json"]).code(1));
+    let (catalogues, originals) = judged(of_catalogue(&["--json"]).code(1));
+    assert_eq!(own, catalogues);
+    let found = originals[0].as_str().unwrap();
+    assert!(
+        found.starts_with(&folder) && copies[0] != originals[0],
+        "{found}"
+    );
+    // The originals are named, and nothing is copied.
+    assert!(!lab.path("sessions/alarms").exists());
+    let page = lab.text("trends.html");
+    assert_contains(&of_catalogue(&["--html", &page]).code(1).out, &[&page]);
+    assert!(
+        links(Path::new(&page))
+            .iter()
+            .any(|link| link.ends_with("night.html"))
+    );
+
+    // Accepted changes come along.
+    let change = [
+        EVENTS,
+        "--night",
+        "2024-02-06T02-00-00Z-small",
+        "--reason",
+        "a lamp",
+    ];
+    nights.accept(&change).code(0);
+    let again = register();
+    assert_contains(&again.out, &["nights      0 added, 40 unchanged"]);
+    let (own, _) = judged(nights.trend(&["--json"]).code(0));
+    assert_eq!(own, judged(of_catalogue(&["--json"]).code(0)).0);
+
+    // Without arguments, the catalogue that the environment names is asked; folders that are gone are on another computer.
+    for night in files(&lab.path("nights"), "-small") {
+        std::fs::remove_dir_all(night).unwrap();
+    }
+    std::fs::remove_file(&nights.history).unwrap();
+    let mut of_environment = program(&["hil", "trend"]);
+    of_environment.env("SKINRIG_CATALOGUE", &catalogue);
+    let trend = run_to_end(of_environment).code(0);
+    assert_contains(&trend.out, &["nothing moved in 40 nights"]);
+    nights.trend(&[]).code(2);
+    of_catalogue(&["--rig", "bench 9"]).code(2).expect_stderr(&[
+        "nights of any suite on bench 9, found small on emulated",
+        "--nights FOLDER",
+    ]);
 }
 
 #[test]

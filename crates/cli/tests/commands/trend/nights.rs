@@ -109,6 +109,8 @@ fn wobble(at: usize) -> f64 {
 pub(super) struct Nights {
     pub lab: Lab,
     pub history: String,
+    /// Whether folders of nights have their results.
+    pub with_json: bool,
 }
 
 impl Nights {
@@ -116,7 +118,11 @@ impl Nights {
         let lab = Lab::new();
         std::fs::create_dir(lab.path("nights")).unwrap();
         let history = lab.text("nights/history.sqlite");
-        Self { lab, history }
+        Self {
+            lab,
+            history,
+            with_json: false,
+        }
     }
 
     /// This many nights; values drop by a fifth from night `change` on.
@@ -173,6 +179,10 @@ impl Nights {
         let home = self.lab.path("nights").join(&night.id);
         std::fs::create_dir(&home).unwrap();
         std::fs::write(home.join("night.html"), "a page").unwrap();
+        if self.with_json {
+            let json = serde_json::to_vec(night).unwrap();
+            std::fs::write(home.join("night.json"), json).unwrap();
+        }
         append(Path::new(&self.history), night, &home).unwrap();
         home
     }

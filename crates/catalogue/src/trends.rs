@@ -1,0 +1,218 @@
+//! Nights of a catalogue as the input of the trends.
+
+use std::collections::BTreeMap;
+
+use skinrig_model::Limit;
+use skinrig_nightly::trend::{
+    Acceptance, Filter, History, NightSummary, NoSuchNights, Point, SuiteNights,
+};
+use skinrig_nightly::{Verdict, Versions};
+
+use crate::catalogue::Catalogue;
+use crate::error::CatalogueError;
+use crate::value::{Bound, Value};
+
+/// Nights of a suite on a bench.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CatalogueNights {
+    /// The nights. Their folders are paths where this computer has them, otherwise what the catalogue calls them.
+    pub history: History,
+    /// Number of nights that an earlier version registered, without what the trends need. They are left out.
+    pub outdated: usize,
+}
+
+const SUITES: &str = "SELECT rig, rig_kind, suite, count(*), max(started_at) FROM night GROUP BY rig, rig_kind, suite";
+
+const NIGHTS: &str = "SELECT sha256, night_id, started_at, suite_sha256, rig_sha256, software, analysis, skin, verdict, folder, golden,
+        firmware_json
+    FROM night WHERE rig = $1 AND rig_kind = $2 AND suite = $3";
+
+const VALUES: &str = "SELECT v.sha256, v.check_name, v.subject, v.metric, v.unit, v.value, v.low, v.high, v.n, v.at_least, v.at_most,
+        v.margin, v.verdict, v.part_verdict, v.attempts
+    FROM night_value v JOIN night n ON n.sha256 = v.sha256
+    WHERE n.rig = $1 AND n.rig_kind = $2 AND n.suite = $3";
+
+const ACCEPTANCES: &str =
+    "SELECT series, night_id, reason, accepted_by, accepted_at FROM night_acceptance
+    WHERE rig = $1 ORDER BY store, position";
+
+impl Catalogue {
+    /// The suites whose nights it has, by bench; the one with the newest night first.
+    ///
+    /// # Errors
+    /// If the catalogue cannot be read.
+    pub fn suites(&mut self) -> Result<Vec<SuiteNights>, CatalogueError> {
+        let mut suites: Vec<SuiteNights> = Vec::new();
+        for row in self.rows(SUITES, &[])? {
+            suites.push(SuiteNights {
+                rig: text(&row[0], "rig")?,
+                rig_kind: text(&row[1], "rig_kind")?,
+                suite: text(&row[2], "suite")?,
+                nights: number(&row[3], "count")?,
+                newest: text(&row[4], "started_at")?,
+            });
+        }
+        suites.sort_by(|a, b| {
+            let names = |s: &SuiteNights| (s.rig.clone(), s.rig_kind.clone(), s.suite.clone());
+            (&b.newest, names(a)).cmp(&(&a.newest, names(b)))
+        });
+        Ok(suites)
+    }
+
+    /// The nights of the first suite that `filter` selects, as a history of them has them.
+    ///
+    /// # Errors
+    /// [`CatalogueError::NoNights`] if it selects none; if the catalogue cannot be read.
+    pub fn nights(&mut self, filter: &Filter) -> Result<CatalogueNights, CatalogueError> {
+        let suites = self.suites()?;
+        let none = |found: NoSuchNights| CatalogueError::NoNights {
+            place: self.place.clone(),
+            found,
+        };
+        let of = filter.choose(&suites).map_err(none)?;
+        let key = [(&of.rig).into(), (&of.rig_kind).into(), (&of.suite).into()];
+        let mut nights = Vec::new();
+        let mut outdated = 0;
+        for row in self.rows(NIGHTS, &key)? {
+            if row[3] == Value::Null {
+                outdated += 1;
+                continue;
+            }
+            nights.push((text(&row[0], "sha256")?, self.night(of, &row)?));
+        }
+        nights.sort_by(|(_, a), (_, b)| (&a.started, &a.id).cmp(&(&b.started, &b.id)));
+        let at = nights.iter().zip(0..);
+        let at: BTreeMap<String, usize> = at.map(|((key, _), at)| (key.clone(), at)).collect();
+        let mut history = History {
+            nights: nights.into_iter().map(|(_, night)| night).collect(),
+            ..History::default()
+        };
+        let mut values = Vec::new();
+        for row in self.rows(VALUES, &key)? {
+            if let Some(&night) = at.get(&text(&row[0], "sha256")?) {
+                values.push(value(night, &row)?);
+            }
+        }
+        values.sort_by(|(a_name, a_unit, a), (b_name, b_unit, b)| {
+            (a.night, a_name, a_unit).cmp(&(b.night, b_name, b_unit))
+        });
+        for (name, unit, point) in values {
+            history.add(&name, &unit, point);
+        }
+        for row in self.rows(ACCEPTANCES, &key[..1])? {
+            let accepted = Acceptance {
+                series: optional(&row[0]),
+                night: text(&row[1], "night_id")?,
+                reason: text(&row[2], "reason")?,
+                by: text(&row[3], "accepted_by")?,
+                at: text(&row[4], "accepted_at")?,
+            };
+            // Copies of a history lie in several folders.
+            if !history.accepted.contains(&accepted) {
+                history.accepted.push(accepted);
+            }
+        }
+        Ok(CatalogueNights { history, outdated })
+    }
+
+    fn rows(
+        &mut self,
+        sql: &'static str,
+        parameters: &[Bound],
+    ) -> Result<Vec<Vec<Value>>, CatalogueError> {
+        let found = self.runtime.block_on(self.db.fetch(sql, parameters));
+        found
+            .map(|found| found.rows)
+            .map_err(|e| CatalogueError::sql(&self.place, "reading its nights", e))
+    }
+
+    /// A row of [`NIGHTS`].
+    fn night(&self, of: &SuiteNights, row: &[Value]) -> Result<NightSummary, CatalogueError> {
+        let folder = text(&row[9], "folder")?;
+        let firmware = text(&row[11], "firmware_json")?;
+        Ok(NightSummary {
+            id: text(&row[1], "night_id")?,
+            started: text(&row[2], "started_at")?,
+            suite: of.suite.clone(),
+            suite_sha256: text(&row[3], "suite_sha256")?,
+            rig: of.rig.clone(),
+            rig_kind: of.rig_kind.clone(),
+            rig_sha256: text(&row[4], "rig_sha256")?,
+            versions: Versions {
+                software: text(&row[5], "software")?,
+                analysis: number(&row[6], "analysis")?,
+                firmware: serde_json::from_str(&firmware)
+                    .map_err(|e| invalid("firmware_json", &e.to_string()))?,
+                skin: optional(&row[7]),
+            },
+            verdict: verdict(&row[8], "verdict")?,
+            folder: self
+                .folder_of(&folder)
+                .map_or(folder, |path| path.display().to_string()),
+            golden: optional(&row[10]),
+        })
+    }
+}
+
+/// Name and unit of the series of a row of [`VALUES`], and the point.
+fn value(night: usize, row: &[Value]) -> Result<(String, String, Point), CatalogueError> {
+    let name = format!(
+        "{}/{}/{}",
+        text(&row[1], "check_name")?,
+        text(&row[2], "subject")?,
+        text(&row[3], "metric")?
+    );
+    let limit = real(&row[11]).map(|margin| Limit {
+        at_least: real(&row[9]),
+        at_most: real(&row[10]),
+        margin,
+    });
+    let point = Point {
+        night,
+        value: real(&row[5]),
+        interval: real(&row[6]).zip(real(&row[7])).map(<[f64; 2]>::from),
+        n: match &row[8] {
+            Value::Null => None,
+            n => Some(number(n, "n")?),
+        },
+        limit,
+        verdict: verdict(&row[12], "verdict")?,
+        part: verdict(&row[13], "part_verdict")?,
+        attempts: number(&row[14], "attempts")?,
+    };
+    Ok((name, text(&row[4], "unit")?, point))
+}
+
+/// A column that another program changed.
+fn invalid(column: &'static str, found: &str) -> CatalogueError {
+    CatalogueError::InvalidColumn {
+        column,
+        found: found.to_owned(),
+    }
+}
+
+fn text(value: &Value, column: &'static str) -> Result<String, CatalogueError> {
+    optional(value).ok_or_else(|| invalid(column, &format!("{value:?}")))
+}
+
+fn optional(value: &Value) -> Option<String> {
+    value.as_text().map(str::to_owned)
+}
+
+fn real(value: &Value) -> Option<f64> {
+    match value {
+        Value::Real(value) => Some(*value),
+        _ => None,
+    }
+}
+
+fn number<T: TryFrom<i64>>(value: &Value, column: &'static str) -> Result<T, CatalogueError> {
+    let number = value.as_integer().and_then(|n| T::try_from(n).ok());
+    number.ok_or_else(|| invalid(column, &format!("{value:?}")))
+}
+
+fn verdict(value: &Value, column: &'static str) -> Result<Verdict, CatalogueError> {
+    let name = text(value, column)?;
+    let found = Verdict::ALL.into_iter().find(|v| v.name() == name);
+    found.ok_or_else(|| invalid(column, &format!("`{}`", name.escape_debug())))
+}
