@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 use serde::Serialize;
-use skinrig_recorder::{RecorderError, SESSION_SUFFIX};
+use skinrig_recorder::{RecorderError, SESSION_SUFFIX, session_bytes};
 use tokio::runtime::Runtime;
 
 use crate::address::Address;
@@ -396,7 +396,7 @@ impl Catalogue {
 fn read(store: &str, files: &Folder, name: &str) -> ReadFile {
     let path = files.file(name);
     let fingerprint = files.fingerprint(name);
-    let size_bytes = std::fs::metadata(&path).map_or(0, |m| m.len());
+    let size_bytes = session_bytes(&path);
     let entry = entry::read(&path, files.analyses(name));
     ReadFile {
         file: FileEntry {

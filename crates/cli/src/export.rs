@@ -7,7 +7,7 @@ use skinrig_export::{
     CsvFiles, ExportError, Folder, MANIFEST, NpzFile, ParquetFiles, Source, TableName, TableWriter,
 };
 use skinrig_model::{CameraId, RunHeader};
-use skinrig_recorder::{SessionReader, tags_path};
+use skinrig_recorder::{SessionReader, copy_session, tags_path};
 
 use crate::analysis_request::AnalysisRequest;
 use crate::args::{ExportArgs, ExportKind, ExportTable};
@@ -385,8 +385,7 @@ pub(crate) fn bundle(
     folder.check_free(&names).map_err(refused)?;
     let copy = |from: &Path, ending: &str| {
         folder.write_atomic(ending, |to| {
-            let copied = std::fs::copy(from, to);
-            copied.map(drop).map_err(|e| ExportError::File {
+            copy_session(from, to).map_err(|e| ExportError::File {
                 path: to.to_owned(),
                 found: e.to_string(),
             })

@@ -59,6 +59,7 @@ mod signals;
 mod signature;
 pub mod sink;
 mod status;
+mod store;
 mod subprocess;
 mod supervise;
 mod tag;
@@ -128,6 +129,7 @@ fn dates_are_possible(now: SystemTime) -> Result<(), Failure> {
 }
 
 fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
+    store::read_references();
     let json = cli.json;
     let output = terminal::Output {
         json,
@@ -151,6 +153,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::View(a) => view::view(a, json),
         Command::Prototypes(a) => prototypes::prototypes(a, json),
         Command::Tag(a) => tag::tag(a, json),
+        Command::Store(a) => store::store(a, json),
         Command::Catalogue(a) => catalogue::catalogue(a, json),
         Command::Sessions(a) => sessions::sessions(a, json),
         Command::Show(a) => show::show(a, json),

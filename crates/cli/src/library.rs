@@ -19,6 +19,7 @@ use crate::terminal::Output;
 use crate::{analyses, check, compare, conclusion, run, selection};
 
 pub use crate::export::invalid;
+pub use crate::store::read_references;
 pub use crate::view::Program;
 
 /// Returns the official analysis of a session for its tables, without the bulk data for figures, and its later legs as aligned.

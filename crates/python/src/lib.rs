@@ -26,4 +26,10 @@ mod module {
     use crate::functions::{analyze, compare, simulate};
     #[pymodule_export]
     use crate::session::Session;
+
+    #[pymodule_init]
+    fn init(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        skinrig::library::read_references();
+        Ok(())
+    }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::error::RecorderError;
+use crate::object::session_bytes;
 use crate::reader::SessionReader;
 use crate::rows::{PressTally, SessionTotals};
 use crate::sidecar::SESSION_SUFFIX;
@@ -101,7 +102,7 @@ pub fn list_with(
             .file_name()
             .is_some_and(|n| n.to_string_lossy().ends_with(SESSION_SUFFIX));
         if named {
-            let size_bytes = std::fs::metadata(&path).map_or(0, |m| m.len());
+            let size_bytes = session_bytes(&path);
             let read = || {
                 summarise(&path).unwrap_or_else(|e| match e {
                     RecorderError::Empty { .. } => SessionState::Empty,

@@ -10,6 +10,9 @@ use crate::problem::Problem;
 /// What to do with a damaged session file.
 const NEXT_OF_DAMAGE: &str = "; restore the file from a copy, or copy its intact part into a new session with `skinrig salvage`";
 
+/// Error of an object store, with its own words.
+pub type ObjectError = Box<dyn std::error::Error + Send + Sync>;
+
 /// Failure to write or read a session.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -101,6 +104,44 @@ pub enum RecorderError {
         found: u32,
         /// Newest schema version that this build supports.
         supported: u32,
+    },
+    /// The session lies in an object store that this build cannot read.
+    #[error("{}: expected a session, found a reference to {url}; build skinrig with `--features s3`", path.display())]
+    NoObjectStore {
+        /// The reference.
+        path: PathBuf,
+        /// Address of the object.
+        url: String,
+    },
+    /// The session lies in an object store, and its file is needed.
+    #[error("{0}: expected the file of a session, found a reference to {url}; `skinrig store get {0}` fetches it", path.display())]
+    Referred {
+        /// The reference.
+        path: PathBuf,
+        /// Address of the object.
+        url: String,
+    },
+    /// The object store failed.
+    #[error("{}: reading {url}: {source}", path.display())]
+    Object {
+        /// The reference.
+        path: PathBuf,
+        /// Address of the object.
+        url: String,
+        /// Error of the store.
+        source: ObjectError,
+    },
+    /// The object is not the session of the reference.
+    #[error("{}: {url}: expected {expected}, found {found}; restore the object, or the file from a copy", path.display())]
+    OtherObject {
+        /// The reference.
+        path: PathBuf,
+        /// Address of the object.
+        url: String,
+        /// The session of the reference.
+        expected: String,
+        /// What the store has.
+        found: String,
     },
     /// A record is out of order or invalid. Nothing of it was written.
     #[error("{record}: expected {expected}, found {found}")]
@@ -302,7 +343,7 @@ impl RecorderError {
                     source.kind(),
                     ErrorKind::NotFound | ErrorKind::NotADirectory
                 ),
-                other => matches!(other, Self::Unread(_)),
+                other => matches!(other, Self::Unread(_) | Self::Object { .. }),
             };
         };
         if matches!(&**source, sqlx::Error::Io(_)) {

@@ -38,6 +38,7 @@ mod legacy_text;
 mod lock;
 mod migrations;
 mod notification;
+mod object;
 mod open;
 mod pose;
 mod prepare;
@@ -51,14 +52,19 @@ mod resume;
 mod salvage;
 mod schema;
 mod seal;
+mod stored;
 mod totals;
 mod touch;
 mod worker;
 
 pub use catalogue::{SessionState, SessionSummary, list, list_with};
 pub use close_result::SealedSession;
-pub use error::{CopyError, RecorderError, RescueError, WriteFailure};
+pub use error::{CopyError, ObjectError, RecorderError, RescueError, WriteFailure};
 pub use lock::writer_of;
+pub use object::{
+    OBJECTS_VFS, ObjectStore, ReadSeek, SessionReference, StartStore, session_bytes,
+    use_object_store,
+};
 pub use problem::Problem;
 pub use queue::QueueLoad;
 pub use reader::SessionReader;
@@ -69,6 +75,7 @@ pub use rows::{
 pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
 pub use sidecar::SESSION_SUFFIX;
 pub use skinrig_formats::codec::Codec;
+pub use stored::{copy_session, reference_to};
 pub use tags::{
     Annotation, AnnotationNote, Annotations, annotate, annotations, is_valid_tag, tags_path,
 };

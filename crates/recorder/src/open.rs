@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{ConnectOptions, Connection, Row};
+use tokio::runtime::Runtime;
 
 use crate::error::RecorderError;
 use crate::migrations::SCHEMA_VERSION;
+use crate::object::{self, OBJECTS_VFS, SessionReference};
 use crate::query::{Fault, each_row};
 use crate::schema::{APPLICATION_ID, BUSY_TIMEOUT, writable};
 use crate::sidecar::{reject_special_files, reject_super_journal, sidecar_path};
@@ -33,8 +35,70 @@ const POLL_INTERVAL: Duration = Duration::from_millis(10);
 /// Most rows that SQLite's thread reads ahead: waking two threads for each row costs more than the row.
 const ROWS_AHEAD: usize = 1024;
 
-/// Opens a session file for reading, after checking its first page. Also returns whether the file never changes.
-pub(crate) async fn open(path: &Path) -> Result<(SqliteConnection, bool), RecorderError> {
+/// What a reader opens.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// The file, which may still grow.
+    Growing,
+    /// The file, which never changes.
+    Sealed,
+    /// The object at this address, which never changes.
+    Object(String),
+}
+
+/// Opens a session for reading, after checking that it is one.
+pub(crate) async fn open(path: &Path) -> Result<(SqliteConnection, Source), RecorderError> {
+    match SessionReference::of(path)? {
+        None => open_file(path).await,
+        Some(reference) => {
+            let done = open_object(path, &reference).await;
+            done.map_err(|e| object::explain(path, &reference.url, e))
+        }
+    }
+}
+
+/// Opens the session of a reference, after checking that the object is that session.
+async fn open_object(
+    path: &Path,
+    reference: &SessionReference,
+) -> Result<(SqliteConnection, Source), RecorderError> {
+    reference.check_size(path)?;
+    let source = Source::Object(reference.url.clone());
+    let mut conn = connect(path, &source).await?;
+    let found = check_object(&mut conn).await;
+    let found = found.map_err(|fault| fault.at(path, "reading its seal"))?;
+    let expected = [&reference.session_id, &reference.content_sha256];
+    match found {
+        Some((id, seal)) if [&id, &seal] == expected => Ok((conn, source)),
+        Some((id, seal)) => Err(reference.other(path, format!("session {id}, sealed as {seal}"))),
+        None => Err(reference.other(path, "no sealed session of this version".to_owned())),
+    }
+}
+
+/// Identifier and seal of a sealed session whose schema this build reads; `None` for anything else.
+pub(crate) async fn check_object(
+    conn: &mut SqliteConnection,
+) -> Result<Option<(String, String)>, Fault> {
+    let application: i64 = sqlx::query_scalar("PRAGMA application_id")
+        .fetch_one(&mut *conn)
+        .await?;
+    let version: i64 = sqlx::query_scalar("PRAGMA user_version")
+        .fetch_one(&mut *conn)
+        .await?;
+    if application != i64::from(APPLICATION_ID)
+        || version > i64::from(SCHEMA_VERSION)
+        || !check_schema(conn).await?
+    {
+        return Ok(None);
+    }
+    let sql = "SELECT session.session_id, lower(hex(seal.tree_sha256)) FROM session, seal";
+    let row = sqlx::query(sql).fetch_optional(conn).await?;
+    row.map(|row| Ok((row.try_get(0)?, row.try_get(1)?)))
+        .transpose()
+}
+
+/// Opens a session file for reading, after checking its first page.
+async fn open_file(path: &Path) -> Result<(SqliteConnection, Source), RecorderError> {
     reject_special_files(path)?;
     let from = Instant::now();
     while crate::lock::is_being_sealed(path) && from.elapsed() < SEAL_WAIT {
@@ -48,30 +112,37 @@ pub(crate) async fn open(path: &Path) -> Result<(SqliteConnection, bool), Record
         mode = check_first_page(path)?;
     }
     // A sealed file is in rollback mode, has no files beside it and never changes, unless it is just being sealed.
-    let immutable = mode == JournalMode::Rollback
+    let is_sealed = mode == JournalMode::Rollback
         && crate::lock::writer_of(path).is_none()
         && !["-wal", "-journal"]
             .iter()
             .any(|end| sidecar_path(path, end).exists());
-    let mut conn = connect(path, immutable).await?;
+    let source = match is_sealed {
+        true => Source::Sealed,
+        false => Source::Growing,
+    };
+    let mut conn = connect(path, &source).await?;
     let schema = check_schema(&mut conn).await;
     let has_schema = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
     if has_schema {
-        Ok((conn, immutable))
+        Ok((conn, source))
     } else {
         Err(empty(path))
     }
 }
 
-/// Opens a session file for reading, beside a connection that checked it; `immutable` as returned by [`open`].
+/// Opens a session for reading, beside a connection that checked it; `source` as returned by [`open`].
 pub(crate) async fn connect(
     path: &Path,
-    immutable: bool,
+    source: &Source,
 ) -> Result<SqliteConnection, RecorderError> {
-    SqliteConnectOptions::new()
-        .filename(path)
+    let options = match source {
+        Source::Object(url) => SqliteConnectOptions::new().filename(url).vfs(OBJECTS_VFS),
+        Source::Growing | Source::Sealed => SqliteConnectOptions::new().filename(path),
+    };
+    options
         .read_only(true)
-        .immutable(immutable)
+        .immutable(*source != Source::Growing)
         .foreign_keys(true)
         .busy_timeout(BUSY_TIMEOUT)
         .row_buffer_size(ROWS_AHEAD)
@@ -214,6 +285,17 @@ fn check_first_page(path: &Path) -> Result<JournalMode, RecorderError> {
         (1, 1) => JournalMode::Rollback,
         _ => JournalMode::Log,
     })
+}
+
+/// Async runtime of one connection.
+pub(crate) fn runtime(path: &Path) -> Result<Runtime, RecorderError> {
+    tokio::runtime::Builder::new_current_thread()
+        .build()
+        .map_err(|source| RecorderError::Io {
+            path: path.to_owned(),
+            doing: "starting to read it",
+            source,
+        })
 }
 
 #[cfg(test)]

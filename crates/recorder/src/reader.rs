@@ -10,7 +10,8 @@ use tokio::runtime::Runtime;
 use crate::digest::{digest_table, sealed_tables};
 use crate::error::RecorderError;
 use crate::from_row::{header_from, planned_from};
-use crate::open;
+use crate::object;
+use crate::open::{self, Source, runtime};
 use crate::query::{Fault, each_row, enum_value, int, real, sha, text};
 use crate::rows::{DeviceRow, Headline, PressTally, Seal, SessionTotals};
 use crate::seal::placeholder_of;
@@ -28,8 +29,7 @@ mod stream;
 #[derive(Debug)]
 pub struct SessionReader {
     path: PathBuf,
-    /// Whether the file never changes.
-    immutable: bool,
+    source: Source,
     inner: Mutex<(Runtime, SqliteConnection)>,
 }
 
@@ -53,10 +53,10 @@ impl SessionReader {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let runtime = runtime(&path)?;
-        let (conn, immutable) = runtime.block_on(open::open(&path))?;
+        let (conn, source) = runtime.block_on(open::open(&path))?;
         Ok(Self {
             path,
-            immutable,
+            source,
             inner: Mutex::new((runtime, conn)),
         })
     }
@@ -65,10 +65,10 @@ impl SessionReader {
     /// cannot be sealed.
     pub(crate) fn reopen(&self) -> Result<Self, RecorderError> {
         let runtime = runtime(&self.path)?;
-        let conn = runtime.block_on(open::connect(&self.path, self.immutable))?;
+        let conn = runtime.block_on(open::connect(&self.path, &self.source))?;
         Ok(Self {
             path: self.path.clone(),
-            immutable: self.immutable,
+            source: self.source.clone(),
             inner: Mutex::new((runtime, conn)),
         })
     }
@@ -87,9 +87,14 @@ impl SessionReader {
     ) -> Result<T, RecorderError> {
         let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         let (runtime, conn) = &mut *inner;
-        runtime
-            .block_on(queries(conn))
-            .map_err(|fault| fault.at(&self.path, doing))
+        let done = runtime.block_on(queries(conn));
+        done.map_err(|fault| {
+            let error = fault.at(&self.path, doing);
+            match &self.source {
+                Source::Object(url) => object::explain(&self.path, url, error),
+                Source::Growing | Source::Sealed => error,
+            }
+        })
     }
 
     fn query_all<T>(
@@ -341,15 +346,4 @@ impl SessionReader {
     pub fn totals(&self) -> Result<SessionTotals, RecorderError> {
         self.query("counting", totals::totals)
     }
-}
-
-/// Async runtime of one connection.
-fn runtime(path: &Path) -> Result<Runtime, RecorderError> {
-    tokio::runtime::Builder::new_current_thread()
-        .build()
-        .map_err(|source| RecorderError::Io {
-            path: path.to_owned(),
-            doing: "starting to read it",
-            source,
-        })
 }

@@ -4,7 +4,7 @@
 //! the file, the placeholder is located on the page of table `seal`, the file is hashed with those 32 bytes as zero,
 //! and the hash replaces the placeholder.
 
-use std::fs::{File, OpenOptions};
+use std::fs::OpenOptions;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 use sqlx::sqlite::SqliteConnection;
 
 use crate::digest::{digest_tables, tree_hash};
+use crate::object::ReadSeek;
 use crate::query::Fault;
 use crate::rows::SessionTotals;
 
@@ -110,16 +111,15 @@ pub(crate) enum Stamp {
 
 /// Compares the file hash `recorded` on page `page` with the file, whose recorded tree hash is `tree`.
 pub(crate) fn check_stamp(
-    path: &Path,
+    file: &mut dyn ReadSeek,
     page: u32,
     recorded: &[u8; 32],
     tree: &[u8; 32],
 ) -> std::io::Result<Stamp> {
-    let mut file = File::open(path)?;
-    let Some(at) = locate(&mut file, page, recorded)? else {
+    let Some(at) = locate(file, page, recorded)? else {
         return Ok(Stamp::Misplaced);
     };
-    let found = hash_around(&mut file, at)?;
+    let found = hash_around(file, at)?;
     let placeholder = placeholder_of(tree);
     let written =
         (0..32).find(|n| recorded[..*n] == found[..*n] && recorded[*n..] == placeholder[*n..]);
@@ -131,7 +131,7 @@ pub(crate) fn check_stamp(
 }
 
 /// Offset of `needle` in the file, if page `page` contains it exactly once.
-fn locate(file: &mut File, page: u32, needle: &[u8; 32]) -> std::io::Result<Option<u64>> {
+fn locate(file: &mut dyn ReadSeek, page: u32, needle: &[u8; 32]) -> std::io::Result<Option<u64>> {
     let mut head = [0u8; 18];
     file.seek(SeekFrom::Start(0))?;
     file.read_exact(&mut head)?;
@@ -143,9 +143,7 @@ fn locate(file: &mut File, page: u32, needle: &[u8; 32]) -> std::io::Result<Opti
     let start = u64::from(page).saturating_sub(1) * page_bytes;
     let mut bytes = Vec::new();
     file.seek(SeekFrom::Start(start))?;
-    Read::by_ref(file)
-        .take(page_bytes)
-        .read_to_end(&mut bytes)?;
+    Read::take(file, page_bytes).read_to_end(&mut bytes)?;
     let mut found = bytes
         .windows(needle.len())
         .enumerate()
@@ -157,7 +155,7 @@ fn locate(file: &mut File, page: u32, needle: &[u8; 32]) -> std::io::Result<Opti
 }
 
 /// SHA-256 of the file with the 32 bytes at `at` as zero.
-fn hash_around(file: &mut File, at: u64) -> std::io::Result<[u8; 32]> {
+fn hash_around(file: &mut dyn ReadSeek, at: u64) -> std::io::Result<[u8; 32]> {
     let mut hash = Sha256::new();
     let mut buffer = vec![0u8; 1 << 20];
     let mut position = 0u64;

@@ -39,6 +39,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
         &[
             "sessions",
             "catalogue",
+            "store",
             "show",
             "tag",
             "select",

@@ -36,6 +36,7 @@ use crate::catalogue::args::CatalogueArgs;
 use crate::exit::Exit;
 use crate::hil::args::{HilArgs, HoldArmArgs};
 use crate::reanalyze::args::ReanalyzeArgs;
+use crate::store::args::StoreArgs;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
 #[derive(Debug, Parser)]
@@ -158,6 +159,14 @@ pub(crate) enum Command {
         Everything in it is read from the files: delete it, and `skinrig catalogue rebuild` makes it again."
     )]
     Catalogue(CatalogueArgs),
+
+    /// Keep sessions in an S3-compatible store, and read them there (builds with `--features s3`).
+    #[command(
+        after_help = "Example:\n  skinrig store put sessions/NAME.session.sqlite --to s3://lab/2026\n\n\
+        Every command reads a session through its reference, by ranges. AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and\n\
+        AWS_DEFAULT_REGION name the store and its user, as for Amazon's tools."
+    )]
+    Store(StoreArgs),
 
     /// List the prototypes in a folder: sessions, best and latest RMSE, trend over time.
     #[command(after_help = "Examples:\n  skinrig prototypes\n  \

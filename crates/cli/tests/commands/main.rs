@@ -56,6 +56,7 @@ mod signing;
 mod special;
 mod starter;
 mod stopping;
+mod store;
 mod strangers;
 mod streams;
 mod support;

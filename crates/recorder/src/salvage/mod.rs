@@ -20,6 +20,7 @@ use sha2::{Digest, Sha256};
 
 use crate::error::RecorderError;
 use crate::hex::hex;
+use crate::object::SessionReference;
 use crate::query::Fault;
 use crate::schema;
 use crate::sidecar::{reject_special_files, sidecar_path};
@@ -40,6 +41,12 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
         .build()
         .map_err(|source| io(from, "starting to read it", source))?;
     reject_special_files(from)?;
+    if let Some(reference) = SessionReference::of(from)? {
+        return Err(RecorderError::Referred {
+            path: from.to_owned(),
+            url: reference.url,
+        });
+    }
     let log = sidecar_path(from, "-wal");
     let source_sha256 = sha256_of(from)?;
     let mut pages = Pages::open(from, &log).map_err(|e| io(from, "reading it", e))?;

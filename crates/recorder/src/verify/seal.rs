@@ -7,6 +7,7 @@ use super::report::VerifyReport;
 use crate::digest::{TableDigest, digest_tables_beside, sealed_tables, tree_hash};
 use crate::hex::hex;
 use crate::lock::WriterLock;
+use crate::object::{SessionReference, open_bytes};
 use crate::query::num;
 use crate::reader::SessionReader;
 use crate::seal::{self, Stamp};
@@ -31,8 +32,10 @@ pub(super) fn check(
         let page = seal::seal_page(conn).await;
         // Before the digests: another thread reads the largest of these tables meanwhile.
         if let Ok(page) = page {
-            let (path, tree) = (reader.path(), &seal.tree_sha256);
-            stamp = Some(seal::check_stamp(path, page, &seal.file_sha256, tree));
+            let bytes = open_bytes(reader.path()).map_err(std::io::Error::other);
+            stamp = Some(bytes.and_then(|mut bytes| {
+                seal::check_stamp(&mut *bytes, page, &seal.file_sha256, &seal.tree_sha256)
+            }));
         }
         // A digest other than the recorded one may be of a moment before the seal.
         let edges = edges.recv().ok().flatten();
@@ -87,8 +90,9 @@ pub(super) fn check(
 
 /// Makes a sealed but writable file read-only. Its writer ended just before it did so, or just after it began to resume the session.
 pub(crate) fn protect(path: &Path, report: &mut VerifyReport) {
-    let is_writable = || std::fs::metadata(path).is_ok_and(|m| !m.permissions().readonly());
-    if !is_writable() {
+    let is_writable = std::fs::metadata(path).is_ok_and(|m| !m.permissions().readonly());
+    // Objects never change, and their references are replaced.
+    if !is_writable || matches!(SessionReference::of(path), Ok(Some(_))) {
         return;
     }
     // Only if no writer is about to remove the seal.
