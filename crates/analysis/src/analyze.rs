@@ -211,22 +211,17 @@ fn analyze_by(
     Ok((analysis, kept))
 }
 
-/// [`camera_pass`] of both cameras, in parallel.
+/// [`camera_pass`] of both cameras, in parallel if the pool of this process has several threads: a worker of a cluster has one.
 fn both_cameras(
     input: &SessionInput,
     source: &dyn EventSource,
     plan: &Closeups,
     [one, two]: [CameraClock; 2],
 ) -> Result<[CameraResult; 2], AnalysisError> {
-    let (first, second) = std::thread::scope(|scope| {
-        let second = scope.spawn(move || camera_pass(input, source, CameraId::Two, plan, two));
-        let first = camera_pass(input, source, CameraId::One, plan, one);
-        let second = match second.join() {
-            Ok(result) => result,
-            Err(panic) => std::panic::resume_unwind(panic),
-        };
-        (first, second)
-    });
+    let (first, second) = rayon::join(
+        || camera_pass(input, source, CameraId::One, plan, one),
+        || camera_pass(input, source, CameraId::Two, plan, two),
+    );
     Ok([first?, second?])
 }
 

@@ -46,22 +46,14 @@ pub(crate) struct CameraClocks {
 }
 
 impl CameraClocks {
-    /// Reads the events and finds the clocks; cameras in parallel.
+    /// Reads the events and finds the clocks; cameras in parallel if the pool has several threads.
     pub(crate) fn new(
         input: &SessionInput,
         source: &dyn EventSource,
         base: Option<&TimeBase>,
     ) -> Result<Self, AnalysisError> {
         let read = |camera: CameraId| CameraClock::new(input, source, camera, base);
-        let [one, two] = std::thread::scope(|scope| {
-            let second = scope.spawn(|| read(CameraId::Two));
-            let first = read(CameraId::One);
-            let second = match second.join() {
-                Ok(result) => result,
-                Err(panic) => std::panic::resume_unwind(panic),
-            };
-            [first, second]
-        });
+        let (one, two) = rayon::join(|| read(CameraId::One), || read(CameraId::Two));
         let mut readings = Self {
             cameras: [one?, two?],
             evidence: None,

@@ -1,6 +1,6 @@
 //! Owns caveats about the results as a whole: settings that do not fit the data, contradictory results.
 
-use skinrig_model::{AnalysisSettings, CameraId, Estimator};
+use skinrig_model::{AnalysisSettings, CameraId, Estimator, Point2, PressId, PressRole};
 
 use crate::background::{Background, CoreThreshold};
 use crate::metrics::quantile;
@@ -11,6 +11,8 @@ use crate::storms::storms;
 
 /// A thinned row is comparable if it locates at least this share of what all events locate.
 const COMPARABLE: f64 = 0.95;
+/// Fewest presses in a row whose equal positions are suspicious, and fewest groups of equal ones beside them.
+const REPEATED: usize = 3;
 /// Share of presses with a dense background that is worth a caveat.
 const MANY: f64 = 0.1;
 
@@ -25,7 +27,47 @@ pub(crate) fn caveats(analysis: &Analysis) -> Vec<Warning> {
         left_out.and_then(|l| calibration_disagrees(&analysis.scored.rmse_mm, &l, is_known));
     let fewer = analysis.reduction.iter().filter_map(fewer_events_do_better);
     let storms = storms(&analysis.presses);
-    dense.chain(disagree).chain(fewer).chain(storms).collect()
+    let made = analysis.presses.iter();
+    let made = made.filter(|p| p.role != PressRole::Sync);
+    let measured: Vec<_> = made.filter_map(|p| Some((p.press, p.truth?))).collect();
+    let unknown = analysis
+        .left_out_rmse()
+        .and_then(|rmse| left_out_unknown(&rmse, &measured));
+    dense
+        .chain(disagree)
+        .chain(fewer)
+        .chain(storms)
+        .chain(repeated_positions(&measured))
+        .chain(unknown)
+        .collect()
+}
+
+/// A caveat if at least three presses in a row have one position to the last digit, and longer so than most do. Measured positions never
+/// repeat exactly; those of a plan do, if it presses each location so many times.
+fn repeated_positions(measured: &[(PressId, Point2)]) -> Option<Warning> {
+    let runs: Vec<&[(PressId, Point2)]> = measured.chunk_by(|a, b| a.1 == b.1).collect();
+    let longest = runs.iter().max_by_key(|run| run.len())?;
+    let mut lengths: Vec<f64> = runs.iter().map(|run| run.len() as f64).collect();
+    let usual = quantile(&mut lengths, 0.5)?;
+    if longest.len() < REPEATED || longest.len() as f64 <= usual || runs.len() < REPEATED {
+        return None;
+    }
+    let ((first, _), (last, _)) = longest.first().zip(longest.last())?;
+    let (first, last) = (*first, *last);
+    Some(WarningCause::RepeatedPositions { first, last }.into())
+}
+
+/// A caveat if the interval of the RMSE where no press calibrated is wider than the area that was pressed.
+fn left_out_unknown(rmse: &Estimate, measured: &[(PressId, Point2)]) -> Option<Warning> {
+    let extent = |of: fn(&Point2) -> f64| {
+        let values = || measured.iter().map(|(_, at)| of(at));
+        let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
+        Some(high - low)
+    };
+    let extent_mm = libm::hypot(extent(|at| at.x_mm)?, extent(|at| at.y_mm)?);
+    let is_wide = rmse.high? - rmse.low? > extent_mm && extent_mm > 0.0;
+    let rmse_mm = *rmse;
+    is_wide.then(|| WarningCause::LeftOutUnknown { rmse_mm, extent_mm }.into())
 }
 
 /// A caveat if the background alone creates core events in some presses: the events expected in a neighbourhood plus two standard
@@ -171,5 +213,47 @@ mod tests {
             .unwrap()
             .to_string();
         assert!(found.starts_with("a random 1/4 of the events"), "{found}");
+    }
+
+    /// Presses at these places along x.
+    fn measured(along: &[f64]) -> Vec<(PressId, Point2)> {
+        let at = |(n, x): (u32, &f64)| (PressId::from_index(n), Point2::new(*x, 2.0));
+        (0..).zip(along).map(at).collect()
+    }
+
+    #[test]
+    fn positions_that_repeat_where_others_do_not_are_named() {
+        let say = |along: &[f64]| repeated_positions(&measured(along));
+        for sound in [
+            &[][..],
+            &[1.0; 9],
+            &[1.0, 2.0, 3.0, 4.0],
+            // Twice by chance, and each location three times.
+            &[1.0, 1.0, 2.0, 3.0, 4.0],
+            &[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0],
+        ] {
+            assert_eq!(say(sound), None, "{sound:?}");
+        }
+        let found = say(&[1.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]).unwrap();
+        let (first, last) = (PressId::from_index(2), PressId::from_index(4));
+        assert_eq!(
+            found,
+            WarningCause::RepeatedPositions { first, last }.into()
+        );
+        assert!(found.cause.is_grave());
+    }
+
+    #[test]
+    fn an_interval_wider_than_the_pressed_area_is_called_unknown() {
+        let area = measured(&[0.0, 30.0, 60.0]);
+        assert_eq!(left_out_unknown(&estimate(30.0, 29.0), &area), None);
+        let found = left_out_unknown(&estimate(30.0, 31.0), &area)
+            .unwrap()
+            .to_string();
+        assert!(
+            found.contains("is unknown") && found.contains("60 mm"),
+            "{found}"
+        );
+        assert_eq!(left_out_unknown(&estimate(30.0, 31.0), &area[..1]), None);
     }
 }

@@ -12,10 +12,9 @@ later (name, generation) AS (
 ),
 family (name, generation) AS (SELECT name, generation FROM before UNION SELECT name, generation FROM later)
 SELECT f.generation, f.name, min(p.relation) AS relation, min(p.parent) AS parent, min(p.made_on) AS made_on,
-       count(DISTINCT s.session_id) AS sessions, avg(a.rmse_mm) AS mean_rmse_mm
+       count(DISTINCT s.session_id) AS sessions
 FROM family f
 LEFT JOIN prototype p ON p.name = f.name
 LEFT JOIN session s ON s.prototype = f.name
-LEFT JOIN analysis a ON a.session_id = s.session_id AND a.name = 'official' AND a.is_valid = 1 AND a.located_rate >= 0.5
 GROUP BY f.generation, f.name
 ORDER BY f.generation, f.name

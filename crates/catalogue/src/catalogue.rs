@@ -263,6 +263,7 @@ impl Catalogue {
             ..Registration::default()
         };
         self.transaction("forgetting files", async |db| {
+            db.lock(&store).await?;
             for name in &done.forgotten {
                 write::forget(db, &store, name).await?;
             }

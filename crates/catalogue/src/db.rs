@@ -120,7 +120,7 @@ impl Db {
         }
     }
 
-    /// Inside a transaction: waits until no other transaction registers the same session. SQLite has one writer anyway.
+    /// Inside a transaction: waits until no other transaction registers the same session or folder. SQLite has one writer anyway.
     pub(crate) async fn lock(&mut self, key: &str) -> Result<(), sqlx::Error> {
         match self {
             Self::Sqlite(_) => {

@@ -77,6 +77,7 @@ impl Catalogue {
     ) -> Result<(), CatalogueError> {
         let store = self.store_of(nights)?;
         self.transaction("registering accepted changes", async |db| {
+            db.lock(&store).await?;
             let sql = "DELETE FROM night_acceptance WHERE store = $1";
             db.execute(sql, &[(&store).into()]).await?;
             for (position, (rig, accepted)) in (1_u32..).zip(all) {

@@ -205,6 +205,9 @@ impl Question {
 mod tests {
     use super::*;
 
+    /// Questions whose averages are of one analysis or one prototype's comparison each.
+    const EACH_ALONE: [&str; 1] = ["variants"];
+
     #[test]
     fn every_statement_is_a_question_and_uses_its_parameters() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/questions");
@@ -231,6 +234,20 @@ mod tests {
                 question.sql.contains("located_rate >= 0.5")
                     || !(question.sql.contains("avg(") && question.sql.contains("rmse_mm")),
                 "{}: the RMSE of few presses is that of the easy ones",
+                question.name
+            );
+            let groups = question.sql.rsplit("GROUP BY").next().unwrap_or_default();
+            let is_grouped = ["rig_kind", "protocol_name"]
+                .iter()
+                .all(|by| groups.contains(by));
+            let compares = ["rmse_mm", "error_mm"]
+                .iter()
+                .any(|of| question.sql.contains(&format!(".{of})")));
+            assert!(
+                is_grouped
+                    || !(question.sql.contains("avg(") && compares)
+                    || EACH_ALONE.contains(&question.name),
+                "{}: errors of different protocols or kinds of rig are averaged",
                 question.name
             );
             let count = question.parameters.len();

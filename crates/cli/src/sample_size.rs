@@ -15,6 +15,7 @@ use crate::args::DetectArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::clock_text;
 use crate::results::{analyze_shown, check_limit};
+use crate::selection;
 
 /// Below this number of locations the estimated variance is poor: its 95 % interval spans a factor of 6 or more.
 const FEW_LOCATIONS: u32 = 12;
@@ -30,9 +31,16 @@ pub(crate) fn propose(
     args: &DetectArgs,
     json: bool,
 ) -> Outcome {
+    if selection::sessions(session)?.selection.is_some() {
+        return Err(Failure::input(format!(
+            "{}: expected one session, found a selection\n  next: name one of its sessions with --from",
+            session.display()
+        )));
+    }
     let results = analyze_shown(session, AnalysisRequest::default())?;
     check_limit(&results, None)?;
     let analysis = results.analysis;
+    one_depth(&analysis, session)?;
     let refused = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", session.display()));
     let sample = errors(&analysis).map_err(|e| refused(&e))?;
     let measured = power::measure(&sample).map_err(|e| refused(&e))?;
@@ -57,6 +65,24 @@ pub(crate) fn propose(
         print(&plan, counting, others, session);
     }
     Ok(Exit::Ok)
+}
+
+/// Rejects a depth sweep: presses of a location at other depths are no repetitions.
+fn one_depth(analysis: &Analysis, session: &Path) -> Result<(), Failure> {
+    let scored = analysis.presses.iter();
+    let scored = scored.filter(|p| p.role == PressRole::Score);
+    let mut depths: Vec<f64> = scored.map(|p| p.depth_mm).collect();
+    depths.sort_by(f64::total_cmp);
+    depths.dedup();
+    match depths[..] {
+        [] | [_] => Ok(()),
+        _ => Err(Failure::input(format!(
+            "{}: expected scored presses of one depth, found {} depths: errors at different depths do not repeat each other\n  \
+             next: name a session of one depth with --from",
+            session.display(),
+            depths.len()
+        ))),
+    }
 }
 
 /// Error lengths of the scored presses, mm.

@@ -39,6 +39,15 @@ pub struct BaselineComparison {
     pub error: Option<NoResult>,
 }
 
+impl BaselineComparison {
+    /// The difference, with an interval that holds for all comparisons with the first skin together.
+    #[must_use]
+    pub fn difference(&self) -> Option<Interval> {
+        let alone = self.comparison.as_ref().map(|c| c.difference);
+        self.adjusted.map(|a| a.simultaneous).or(alone)
+    }
+}
+
 /// Results for one metric.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {

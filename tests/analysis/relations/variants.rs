@@ -21,6 +21,7 @@ const LEARNT: &[(&str, f64)] = &[
     ("locator", 6.0),
     ("presses[].region", 6.0),
     ("findings", 6.0),
+    ("warnings[].rmse_mm", 6.0),
 ];
 
 const VARIANTS: [Variant; 7] = [

@@ -85,7 +85,7 @@ use crate::rule::Rule;
 /// errors of its own. Version 19: a place that a plan lists again is one location. Version
 /// 20: a look needs half of the presses, and an open question is a warning. Version 24: the window of a long hold ends 1 s after the depth was
 /// reached.
-pub const ANALYSIS_VERSION: u32 = 27;
+pub const ANALYSIS_VERSION: u32 = 28;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -383,6 +383,16 @@ fn of_results() -> Vec<(Value, &'static str)> {
             "a random 1/4 of the events locates better than all of them: RMSE 1.00 mm [0.50, 1.50] against 3.00 mm \
              [2.50, 3.50]; the clustering settings do not suit these event rates",
         ),
+        (
+            json!({"kind": "repeated_positions", "first": 50, "last": 58}),
+            "press 50 to press 58 have the same recorded position to the last digit, and other presses do not repeat so: if a table was \
+             filled in where rows were missing, errors there are not those of the skin; leave these presses out with `skinrig select`",
+        ),
+        (
+            json!({"kind": "left_out_unknown", "rmse_mm": estimate(26.0), "extent_mm": 0.9}),
+            "the RMSE where no press calibrated, 26.00 mm [25.50, 26.50], is unknown: its interval is wider than the pressed area \
+             (1 mm); rays that are nearly parallel there send some estimates far off",
+        ),
     ]
 }
 

@@ -73,6 +73,8 @@ impl WarningCause {
                 | Self::UndecidedLooks { .. }
                 | Self::WindowsOverlap
                 | Self::UnsuitableSettings { .. }
+                | Self::RepeatedPositions { .. }
+                | Self::LeftOutUnknown { .. }
                 | Self::LocatorUnfit { .. }
                 | Self::FewLocationsForModel { .. }
                 | Self::ImplausibleModel { .. }
@@ -545,6 +547,29 @@ pub enum WarningCause {
         rmse_mm: Estimate,
         /// RMSE with all events, mm.
         rmse_of_all_mm: Estimate,
+    },
+    /// Presses in a row with one recorded position, while the others have their own.
+    #[error(
+        "{first} to {last} have the same recorded position to the last digit, and other presses do not repeat so: if a table was \
+         filled in where rows were missing, errors there are not those of the skin; leave these presses out with `skinrig select`"
+    )]
+    RepeatedPositions {
+        /// The first of them.
+        first: PressId,
+        /// The last of them.
+        last: PressId,
+    },
+    /// The RMSE where no press calibrated has an interval wider than the pressed area.
+    #[error(
+        "the RMSE where no press calibrated, {}, is unknown: its interval is wider than the pressed area ({extent_mm:.0} mm); rays that \
+         are nearly parallel there send some estimates far off",
+        in_words(.rmse_mm)
+    )]
+    LeftOutUnknown {
+        /// That RMSE, mm.
+        rmse_mm: Estimate,
+        /// Diagonal of the smallest rectangle around the measured positions, mm.
+        extent_mm: f64,
     },
 }
 

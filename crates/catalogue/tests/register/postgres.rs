@@ -163,6 +163,34 @@ fn a_server_gives_the_answers_of_the_embedded_catalogue() {
 }
 
 #[test]
+fn programs_that_register_a_folder_at_once_wait_for_each_other() {
+    let Some(server) = Server::start() else {
+        return;
+    };
+    let lab = Lab::with_sessions(2);
+    synthetic::write_prototypes(lab.path());
+    server.open().unwrap();
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                let mut catalogue = server.open().unwrap();
+                for n in 0..10 {
+                    catalogue.refresh(lab.path(), n % 2 == 0).unwrap();
+                    let accepted = [nights::accepted(None)];
+                    catalogue
+                        .replace_acceptances(lab.path(), &accepted)
+                        .unwrap();
+                }
+            });
+        }
+    });
+    assert_eq!(
+        server.open().unwrap().status(lab.path()).unwrap().current,
+        2
+    );
+}
+
+#[test]
 fn an_unreachable_server_is_an_error_without_its_password() {
     let folder = tempfile::tempdir().unwrap();
     let url = format!(

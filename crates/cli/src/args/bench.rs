@@ -89,7 +89,7 @@ pub(crate) struct RunArgs {
     #[arg(long, requires = "rig")]
     pub tolerant: bool,
 
-    /// Seed of the run and of the simulated rig [default: the protocol's seed].
+    /// Seed of the simulated rig [default: the protocol's `seed`, which also draws random paths and orders].
     #[arg(long, conflicts_with = "replay")]
     pub seed: Option<u64>,
 

@@ -30,7 +30,8 @@ pub(crate) enum CatalogueCommand {
     #[command(after_help = "Examples:\n  skinrig catalogue register sessions/\n  \
         skinrig catalogue register sessions/NAME.session.sqlite\n  \
         skinrig catalogue register sessions/ --catalogue postgres://ann@db.lab/skins\n\n\
-        `run`, `resume`, `import`, `analyze` and `tag` register their session by themselves.")]
+        `run`, `resume`, `import`, `analyze` and `tag` register their session by themselves, in the file of its folder; a server learns of it by\n\
+        this command.")]
     Register(RegisterArgs),
 
     /// Create the roles of a catalogue on a server, and give them their rights.

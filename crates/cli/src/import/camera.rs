@@ -51,6 +51,22 @@ pub(crate) enum RecordingError {
         /// The file.
         path: PathBuf,
     },
+    /// Most words of the stream cannot be of the format that its header names.
+    #[error(
+        "{0}: expected words of {format}, as its header says, found {strange} of {words} that cannot be: the header is of another \
+         recording\n  next: ask the program that recorded it for the format; the header's line `% evt` or `% format` names it",
+        path.display()
+    )]
+    OtherFormat {
+        /// The file.
+        path: PathBuf,
+        /// The format of the header.
+        format: &'static str,
+        /// Words that cannot be of it.
+        strange: u64,
+        /// Words that were tested, without those of the time base.
+        words: u64,
+    },
     /// The stream ends within a word.
     #[error(
         "{0}: expected whole words of {word} bytes, found {rest} bytes after the last one: the file is cut off\n  next: copy it \

@@ -13,12 +13,12 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use skinrig_controller::{Problem, RunFault};
 use skinrig_device::{CameraSettings, Rig};
-use skinrig_formats::Geometry;
 use skinrig_formats::hdf5::Container;
 use skinrig_formats::inspect::FileKind;
 use skinrig_formats::positions::{LengthUnit, PositionTable};
 use skinrig_formats::raw::RawReader;
 use skinrig_formats::regular;
+use skinrig_formats::{Geometry, Scanner};
 use skinrig_model::{
     CameraId, DeviceIdentity, ExcludedReason, HostDuration, LocationId, Point2, RigidTransform,
     StreamFormat,
@@ -323,6 +323,7 @@ fn open(
             let reader = RawReader::open(&path).map_err(Failure::input)?;
             let format = reader.header().format;
             check_words(&path, &reader).map_err(Failure::input)?;
+            check_format(&path).map_err(Failure::input)?;
             about["header"] = serde_json::json!(reader.header().entries);
             let identity = identity("recorded file (Prophesee RAW, bytes as recorded)");
             FileCamera::new(camera, identity, format, clock.clone(), move |feed| {
@@ -370,6 +371,38 @@ fn check_words(path: &Path, reader: &RawReader) -> Result<(), RecordingError> {
             rest: stream % word,
             whole: header.length + stream - stream % word,
         }),
+    }
+}
+
+/// Bytes at the start of a stream in which its format is tested.
+const TESTED_BYTES: u64 = 16 << 20;
+
+/// Rejects a stream most of whose words cannot be of the format in its header.
+fn check_format(path: &Path) -> Result<(), RecordingError> {
+    let mut reader = RawReader::open(path)?;
+    let format = reader.header().format;
+    let mut scanner = Scanner::new(format);
+    let mut bytes = 0;
+    while bytes < TESTED_BYTES {
+        let next = reader.next_chunk()?;
+        if next.is_empty() {
+            break;
+        }
+        bytes += next.len() as u64;
+        scanner.push(next);
+    }
+    let stats = scanner.stats();
+    let words =
+        (bytes / format.word_bytes() as u64).saturating_sub(stats.time_high + stats.time_low);
+    let strange = stats.skipped_words() + stats.unaligned;
+    match 2 * strange > words {
+        true => Err(RecordingError::OtherFormat {
+            path: path.into(),
+            format: format.name(),
+            strange,
+            words,
+        }),
+        false => Ok(()),
     }
 }
 

@@ -103,7 +103,7 @@ fn presses(p: &PressTally, sync: u64) {
         open => format!(" + {open} without a verdict"),
     };
     outln!(
-        "presses    {} planned = {} valid + {} missed + {} invalid + {} excluded{open}; {sync} sync",
+        "recorded   {} planned = {} valid + {} missed + {} invalid + {} excluded{open}; {sync} sync",
         p.planned,
         p.valid,
         p.missed,

@@ -270,6 +270,31 @@ fn one_file_for_both_cameras() {
 }
 
 #[test]
+fn raw_files_of_another_format_than_their_header_says() {
+    let lab = Lab::new();
+    let mut data = Dataset::new(&lab);
+    skinrig(&data.arguments(&lab.path("t"))).code(0);
+    let session = text(&only(&lab.path("t"), ".session.sqlite"));
+    skinrig(&["export", &session, "--to", "raw", "--out", &lab.text("e")]).code(0);
+    let raw = only(&lab.path("e"), ".camera2.raw");
+    let bytes = std::fs::read(&raw).unwrap();
+    let body = bytes.windows(6).position(|w| w == b"% end\n").unwrap() + 6;
+    let mut of_another = b"% evt 2.1\n% geometry 640x480\n% end\n".to_vec();
+    of_another.extend(&bytes[body..bytes.len() - (bytes.len() - body) % 8]);
+    std::fs::write(&raw, &of_another).unwrap();
+    data.cameras[1] = raw;
+    assert_refused(
+        &lab,
+        &data,
+        2,
+        &[
+            ".camera2.raw",
+            "expected words of evt21, as its header says",
+        ],
+    );
+}
+
+#[test]
 fn raw_files_that_are_cut_off_or_empty() {
     let lab = Lab::new();
     let mut data = Dataset::new(&lab);

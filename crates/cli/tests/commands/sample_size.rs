@@ -1,6 +1,8 @@
 //! Presses needed to detect a difference, from a session's variance.
 
-use crate::support::{Lab, skinrig, text};
+use std::path::Path;
+
+use crate::support::{Lab, ROOT, SMALL, only, skinrig, text};
 
 #[test]
 fn a_session_gives_the_sample_size_of_the_next_one() {
@@ -33,6 +35,16 @@ fn a_session_gives_the_sample_size_of_the_next_one() {
         table.out
     );
 
+    // Errors at several depths are no repetitions.
+    let small = std::fs::read_to_string(Path::new(ROOT).join(SMALL)).unwrap();
+    let deep = small.replace("depth: 1.5 mm", "depths: [0.8 mm, 1.4 mm]");
+    std::fs::write(lab.path("sweep.yaml"), deep).unwrap();
+    let folder = lab.text("d");
+    skinrig(&["run", &lab.text("sweep.yaml"), "--sessions", &folder]).code(0);
+    let sweep = text(&only(&lab.path("d"), ".session.sqlite"));
+    skinrig(&["plan", "--from", &sweep, "--detect", "1 mm"])
+        .code(2)
+        .expect_stderr(&["found 2 depths", "one depth with --from"]);
     skinrig(&["plan", "--detect", "1 mm"])
         .code(2)
         .expect_stderr(&["--from"]);

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use skinrig_compare::{Comparison, ComparisonOptions, NoResult, Subject, compare};
-use skinrig_statistics::AlphaSpending;
+use skinrig_statistics::{AlphaSpending, Interval, Verdict};
 
 use crate::causes::planted::{PlantedCause, record};
 
@@ -49,6 +49,41 @@ fn sessions_of_each_skin_are_told_apart() {
         assert!(found.len() > 5, "{found:?}");
         assert!(found.iter().all(|s| *s == Some(expected)), "{found:?}");
     }
+}
+
+/// An interval that excludes no difference beside "undecided" would be of one comparison alone.
+#[test]
+fn intervals_of_several_skins_hold_together_like_their_verdicts() {
+    let skins: Vec<Subject> = (1..=4)
+        .map(|seed| record(seed, PlantedCause::Nothing).skin('A', None))
+        .zip('A'..)
+        .map(|(of, letter)| skin(letter, &[&of]))
+        .collect();
+    let metrics = 20;
+    let all = compare(&skins, &vec![None; metrics], &ComparisonOptions::default());
+    let pair = compare(
+        &skins[..2],
+        &vec![None; metrics],
+        &ComparisonOptions::default(),
+    );
+    let mut wider = 0;
+    for (row, alone) in all.table.iter().zip(&pair.table) {
+        let (found, alone) = (&row.against_first[0], &alone.against_first[0]);
+        let Some((together, alone)) = found.difference().zip(alone.difference()) else {
+            continue;
+        };
+        let width = |of: &Interval| Some(of.high? - of.low?);
+        let (of_all, of_pair) = (width(&together), width(&alone));
+        if let Some((of_all, of_pair)) = of_all.zip(of_pair) {
+            assert!(of_all >= of_pair, "{}", row.name);
+            wider += usize::from(of_all > of_pair);
+        }
+        let excludes =
+            together.low.is_some_and(|l| l > 0.0) || together.high.is_some_and(|h| h < 0.0);
+        let is_undecided = found.verdict == Some(Verdict::Undecided);
+        assert!(!(excludes && is_undecided), "{}: {together:?}", row.name);
+    }
+    assert!(wider > 5, "{wider}");
 }
 
 /// One session of a skin does not tell how much sessions vary.

@@ -1,7 +1,7 @@
 //! EVT2.1: 64-bit words with a mask of 32 pixels.
 //!
 //! Layout (EVK1 reference, section 4.2; Prophesee's published EVT 2.1 format): type in bits 63:60. EVT_NEG
-//! 0x0 and EVT_POS 0x1 carry t\[5:0\] in 59:54, x in 53:43, y in 42:32 and a mask in 31:0: bit i is an event
+//! 0x0 and EVT_POS 0x1 carry t\[5:0\] in 59:54, x (a multiple of 32) in 53:43, y in 42:32 and a mask in 31:0: bit i is an event
 //! at x + i. TIME_HIGH 0x8 carries t\[33:6\] in 59:32. EXT_TRIGGER 0xA carries t\[5:0\], channel 44:40, edge
 //! 32. OTHERS 0xE carries t\[5:0\], subtype 47:32, payload 31:0. The *legacy* order sends the high half first.
 
@@ -67,6 +67,7 @@ impl Words {
                 let x = (w >> 43 & 0x7ff) as u16;
                 let y = (w >> 32 & 0x7ff) as u16;
                 let polarity = Polarity::from_bit(kind == 1);
+                output.stats.unaligned += u64::from(!x.is_multiple_of(32));
                 let mut mask = w as u32;
                 while mask != 0 {
                     let x = x + mask.trailing_zeros() as u16;

@@ -69,6 +69,8 @@ pub struct StreamStats {
     pub wraps: u64,
     /// CD events outside the sensor; not delivered.
     pub out_of_geometry: u64,
+    /// EVT2.1 vectors whose first column is no multiple of 32, which no sensor sends (Prophesee, EVT 2.1 format). Their events count.
+    pub unaligned: u64,
     /// Bytes that do not form a whole word: at the end, and on both sides of a loss.
     pub trailing_bytes: u64,
 }

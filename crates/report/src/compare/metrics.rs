@@ -36,11 +36,8 @@ fn metric(result: &Comparison, row: &skinrig_compare::Row, k: usize) -> Option<R
     let found = row.against_first.iter().find(|a| a.subject == k)?;
     let c = found.comparison.as_ref();
     let own = |i: usize| row.values.get(i).and_then(|v| v.value).map(|v| v.value);
-    let (difference, interval) = match c {
-        Some(c) => (
-            text::signed(row, c.difference.value),
-            text::interval(row, &c.difference),
-        ),
+    let (difference, interval) = match found.difference() {
+        Some(of) => (text::signed(row, of.value), text::interval(row, &of)),
         None => (NONE.to_owned(), NONE.to_owned()),
     };
     let margin = row.margin.map_or_else(

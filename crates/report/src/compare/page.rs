@@ -103,10 +103,10 @@ fn verdict(result: &Comparison) -> Section {
         );
         notes.push(Note::of(text.code("--limits").add(".")).warning());
     }
-    if result.skins.len() > 2 {
-        notes.push(Note::of(
-            "Verdicts are corrected for the number of skins (Holm).",
-        ));
+    if let Some(text) = text::together(result) {
+        notes.push(Note::of(format!(
+            "These {text} (intervals: Bonferroni, verdicts: Holm)."
+        )));
     }
     let cards = (1..result.skins.len()).map(|k| verdict_card(result, k));
     let left = Group::stack().with_all(cards).with_all(notes);

@@ -53,15 +53,9 @@ fn metrics(result: &Comparison) -> Value {
         .any("skin", |(_, f)| result.skins[f.subject].letter)
         .any("a", |(_, f)| f.comparison.as_ref().map(|c| c.a.value))
         .any("b", |(_, f)| f.comparison.as_ref().map(|c| c.b.value))
-        .any("difference", |(_, f)| {
-            f.comparison.as_ref().map(|c| c.difference.value)
-        })
-        .any("low", |(_, f)| {
-            f.comparison.as_ref().and_then(|c| c.difference.low)
-        })
-        .any("high", |(_, f)| {
-            f.comparison.as_ref().and_then(|c| c.difference.high)
-        })
+        .any("difference", |(_, f)| f.difference().map(|of| of.value))
+        .any("low", |(_, f)| f.difference().and_then(|of| of.low))
+        .any("high", |(_, f)| f.difference().and_then(|of| of.high))
         .any("margin", |(row, _)| row.margin)
         .any("verdict", |(_, f)| f.verdict)
         .finish()

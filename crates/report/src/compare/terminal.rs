@@ -57,6 +57,7 @@ fn verdicts(result: &Comparison) -> Section {
             );
             Some(Note::new("VERDICT", text).tone(Tone::Answer))
         }))
+        .with_all(text::together(result).map(Note::of))
         .with_all(shared(result))
 }
 

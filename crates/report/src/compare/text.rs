@@ -58,6 +58,14 @@ pub(super) const fn verdict(of: Option<Verdict>) -> &'static str {
     }
 }
 
+/// What the verdicts and intervals of several skins hold for; `None` for one.
+pub(super) fn together(result: &Result) -> Option<String> {
+    let others = result.skins.len().checked_sub(1).filter(|n| *n > 1)?;
+    Some(format!(
+        "verdicts and intervals hold for all {others} comparisons with A together"
+    ))
+}
+
 /// Presses required for a decision, without a full stop; `None` when decided.
 pub(super) fn needed(of: &Comparison) -> Option<String> {
     match of.needed {
@@ -126,7 +134,8 @@ pub(super) fn counted(n: usize, what: &str) -> String {
 
 /// RMSE of a skin and the first, with difference and interval.
 pub(super) fn headline(result: &Result, against: &BaselineComparison) -> String {
-    let (Some(row), Some(c)) = (result.headline(), &against.comparison) else {
+    let compared = against.comparison.as_ref().zip(against.difference());
+    let Some((row, (c, difference))) = result.headline().zip(compared) else {
         return against
             .error
             .as_ref()
@@ -136,7 +145,7 @@ pub(super) fn headline(result: &Result, against: &BaselineComparison) -> String 
         "RMSE {} → {} mm, difference {} mm {}",
         value(row, Some(c.a.value)),
         value(row, Some(c.b.value)),
-        signed(row, c.difference.value),
-        interval(row, &c.difference),
+        signed(row, difference.value),
+        interval(row, &difference),
     )
 }

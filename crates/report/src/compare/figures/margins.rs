@@ -1,6 +1,6 @@
 //! Owns the figure of differences in units of their margins, which shows equivalence at a glance.
 
-use skinrig_compare::{Comparison, Row};
+use skinrig_compare::{BaselineComparison, Comparison, Row};
 use skinrig_statistics::{Comparison as Compared, ImprovementDirection, Verdict};
 
 use super::{foot, sign_class};
@@ -14,12 +14,13 @@ const MAX_MARGINS: f64 = 4.0;
 
 /// Skin `k` against the first, one row per metric; `None` without margins.
 pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Figure> {
-    let rows: Vec<(&Row, &Compared, f64, Option<Verdict>)> = result
+    let rows: Vec<(&Row, &BaselineComparison, f64)> = result
         .table
         .iter()
         .filter_map(|row| {
             let found = row.against_first.iter().find(|a| a.subject == k)?;
-            Some((row, found.comparison.as_ref()?, row.margin?, found.verdict))
+            found.comparison.as_ref()?;
+            Some((row, found, row.margin?))
         })
         .collect();
     if rows.is_empty() {
@@ -52,19 +53,19 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Figur
             );
         })
         .upright("axis", 0.0);
-    for (i, (row, compared, margin, verdict)) in rows.into_iter().enumerate() {
+    for (i, (row, found, margin)) in rows.into_iter().enumerate() {
+        let Some((compared, difference)) = found.comparison.as_ref().zip(found.difference()) else {
+            continue;
+        };
         let turn = improvement_factor(row, compared) / margin;
         let ends = |v: Option<f64>| v.map(|v| v * turn);
-        let (mut low, mut high) = (
-            ends(compared.difference.low),
-            ends(compared.difference.high),
-        );
+        let (mut low, mut high) = (ends(difference.low), ends(difference.high));
         if turn < 0.0 {
             std::mem::swap(&mut low, &mut high);
         }
         let (low, high) = (low.unwrap_or(-f64::INFINITY), high.unwrap_or(f64::INFINITY));
-        let at = compared.difference.value * turn;
-        let class = sign_class(match verdict {
+        let at = difference.value * turn;
+        let class = sign_class(match found.verdict {
             Some(Verdict::Better) => -1,
             Some(Verdict::Worse) => 1,
             _ => 0,
@@ -88,7 +89,7 @@ pub(in crate::compare) fn margins(result: &Comparison, k: usize) -> Option<Figur
                 svg.path(&class, &dots([(x(at), y)]));
             }
             let right = place.x.px.1;
-            let verdict = text::verdict(verdict);
+            let verdict = text::verdict(found.verdict);
             svg.text((right + 24.0, y + 4.0), "tick ink", "start", verdict);
             let margin = text::value(row, Some(margin));
             let text = format!("margin {margin} {}", row.format.unit);
