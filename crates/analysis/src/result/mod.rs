@@ -27,6 +27,7 @@ mod tests;
 mod validity;
 mod violation;
 mod warning;
+mod warning_words;
 
 pub use alignment::{
     Alignment, AlignmentStatus, ClockResidual, ClockResiduals, Knot, LineCounts, RatesDetections,

@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CalibrationModel, CameraId, Locator, PressId, Reaction, StopQuestion};
 
+use super::warning_words::{in_words, share_of_crop};
 use super::{Estimate, Fault};
 use crate::clock::{MarksError, RatesError};
 use crate::exclusion::Exclusion;
@@ -587,22 +588,4 @@ fn most(common: Option<&CommonExclusion>) -> String {
         let (n, label) = (common.presses, common.example.label());
         format!(" (most often, {n} times: {label})")
     })
-}
-
-/// Share of the crop in brackets; empty if it rounds to nothing.
-fn share_of_crop(pixels: u32, of: u32) -> String {
-    let percent = 100.0 * f64::from(pixels) / f64::from(of);
-    if percent < 0.005 {
-        String::new()
-    } else {
-        format!(" ({percent:.2} % of the crop)")
-    }
-}
-
-fn in_words(rmse: &Estimate) -> String {
-    match (rmse.value, rmse.low, rmse.high) {
-        (Some(value), Some(low), Some(high)) => format!("{value:.2} mm [{low:.2}, {high:.2}]"),
-        (Some(value), ..) => format!("{value:.2} mm"),
-        _ => "none".to_owned(),
-    }
 }

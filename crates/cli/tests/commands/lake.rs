@@ -105,18 +105,17 @@ fn a_session_is_added_once_and_other_programs_read_it() {
     assert!(content(&lab.path("lake")) == before);
 
     if let Ok(python) = std::env::var("SKINRIG_PYTHON") {
-        let mut read = Command::new(python);
-        read.arg(format!(
-            "{}/tests/python/read_lake.py",
-            crate::support::ROOT
-        ))
-        .arg(lab.path("lake"));
-        let output = read.output().unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        // The second one overwrites files.
+        for reader in ["read_lake_cluster.py", "read_lake.py"] {
+            let script = format!("{}/tests/python/{reader}", crate::support::ROOT);
+            let mut read = Command::new(&python);
+            let output = read.arg(script).arg(lab.path("lake")).output().unwrap();
+            assert!(
+                output.status.success(),
+                "{reader}: {}",
+                String::from_utf8_lossy(&output.stderr)
+            );
+        }
     } else {
         eprintln!(
             "not read by others: no SKINRIG_PYTHON, an interpreter with tests/python/requirements.txt"
