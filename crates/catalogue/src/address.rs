@@ -101,6 +101,14 @@ impl Address {
         }
     }
 
+    /// The computer in a name that [`store_of`](Self::store_of) gave; `None` in a file, which is of one computer.
+    pub(crate) fn computer_of<'a>(&self, store: &'a str) -> Option<&'a str> {
+        match self {
+            Self::File(_) => None,
+            Self::Server(_) => store.split_once(':').map(|(computer, _)| computer),
+        }
+    }
+
     /// The folder that [`store_of`](Self::store_of) called `store`, if it is on this computer.
     pub(crate) fn folder_of(&self, store: &str) -> Option<PathBuf> {
         match self {

@@ -103,6 +103,11 @@ impl Catalogue {
         self.address.store_of(folder)
     }
 
+    /// The computer of a folder of this name in this catalogue; `None` in a file.
+    pub(crate) fn computer_of<'a>(&self, store: &'a str) -> Option<&'a str> {
+        self.address.computer_of(store)
+    }
+
     /// The folder of this name in this catalogue, if it is on this computer.
     pub(crate) fn folder_of(&self, store: &str) -> Option<PathBuf> {
         self.address.folder_of(store)

@@ -48,8 +48,9 @@ impl Catalogue {
                 }
             };
             let folder = self.store_of(file.parent().unwrap_or(nights))?;
+            let computer = self.computer_of(&folder).unwrap_or_default().to_owned();
             let inserted = self.transaction("registering a night", async |db| {
-                insert(db, &night, &folder).await
+                insert(db, &night, &folder, &computer).await
             })?;
             match inserted {
                 Inserted::New => done.registered += 1,
@@ -156,18 +157,26 @@ enum Inserted {
     Conflicting,
 }
 
-/// Inserts a night. Another state of it, from the same folder, is replaced.
-async fn insert(db: &mut Db, night: &Night, folder: &str) -> Result<Inserted, sqlx::Error> {
+/// Inserts a night. Another state of it, from the same folder, is replaced. Benches of other computers may have the same name and begin
+/// their nights in the same second.
+async fn insert(
+    db: &mut Db,
+    night: &Night,
+    folder: &str,
+    computer: &str,
+) -> Result<Inserted, sqlx::Error> {
     let sha256 = digest(night);
     db.lock(&sha256).await?;
     let sql = "DELETE FROM night WHERE (folder = $1 AND sha256 <> $2) OR (sha256 = $2 AND suite_sha256 IS NULL)";
     db.execute(sql, &[folder.into(), (&sha256).into()]).await?;
-    let sql = "SELECT sha256 FROM night WHERE rig = $1 AND rig_kind = $2 AND night_id = $3 AND sha256 <> $4";
+    let sql = "SELECT sha256 FROM night WHERE rig = $1 AND rig_kind = $2 AND night_id = $3 AND sha256 <> $4
+               AND ($5 = '' OR substr(folder, 1, length($5) + 1) = $5 || ':')";
     let named = [
         (&night.rig).into(),
         (&night.rig_kind).into(),
         (&night.id).into(),
         (&sha256).into(),
+        computer.into(),
     ];
     if !db.fetch(sql, &named).await?.rows.is_empty() {
         return Ok(Inserted::Conflicting);

@@ -12,8 +12,25 @@ use crate::catalogue::Catalogue;
 use crate::error::CatalogueError;
 use crate::value::{Bound, Value};
 
+/// A suite on a bench, as the catalogue has it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct Bench {
+    rig: String,
+    rig_kind: String,
+    suite: String,
+    /// `None` in a file, which is of one computer.
+    computer: Option<String>,
+}
+
+impl Bench {
+    /// What its nights say of it.
+    fn name(&self) -> [&str; 3] {
+        [&self.rig, &self.rig_kind, &self.suite]
+    }
+}
+
 /// Nights of a suite on a bench.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct CatalogueNights {
     /// The nights. Their folders are paths where this computer has them, otherwise what the catalogue calls them.
     pub history: History,
@@ -21,7 +38,7 @@ pub struct CatalogueNights {
     pub outdated: usize,
 }
 
-const SUITES: &str = "SELECT rig, rig_kind, suite, count(*), max(started_at) FROM night GROUP BY rig, rig_kind, suite";
+const SUITES: &str = "SELECT rig, rig_kind, suite, folder, started_at FROM night";
 
 const NIGHTS: &str = "SELECT sha256, night_id, started_at, suite_sha256, rig_sha256, software, analysis, skin, verdict, folder, golden,
         firmware_json
@@ -33,29 +50,58 @@ const VALUES: &str = "SELECT v.sha256, v.check_name, v.subject, v.metric, v.unit
     WHERE n.rig = $1 AND n.rig_kind = $2 AND n.suite = $3";
 
 const ACCEPTANCES: &str =
-    "SELECT series, night_id, reason, accepted_by, accepted_at FROM night_acceptance
+    "SELECT series, night_id, reason, accepted_by, accepted_at, store FROM night_acceptance
     WHERE rig = $1 ORDER BY store, position";
 
 impl Catalogue {
-    /// The suites whose nights it has, by bench; the one with the newest night first.
+    /// The suites whose nights it has, by bench; the one with the newest night first. Benches of the same name on several computers are
+    /// told apart by the names of these.
     ///
     /// # Errors
     /// If the catalogue cannot be read.
     pub fn suites(&mut self) -> Result<Vec<SuiteNights>, CatalogueError> {
-        let mut suites: Vec<SuiteNights> = Vec::new();
+        Ok(self
+            .benches()?
+            .into_iter()
+            .map(|(suite, _)| suite)
+            .collect())
+    }
+
+    /// The suites, each with its key in the catalogue.
+    fn benches(&mut self) -> Result<Vec<(SuiteNights, Bench)>, CatalogueError> {
+        let mut found: BTreeMap<Bench, (usize, String)> = BTreeMap::new();
         for row in self.rows(SUITES, &[])? {
-            suites.push(SuiteNights {
+            let folder = text(&row[3], "folder")?;
+            let bench = Bench {
                 rig: text(&row[0], "rig")?,
                 rig_kind: text(&row[1], "rig_kind")?,
                 suite: text(&row[2], "suite")?,
-                nights: number(&row[3], "count")?,
-                newest: text(&row[4], "started_at")?,
-            });
+                computer: self.computer_of(&folder).map(str::to_owned),
+            };
+            let (nights, newest) = found.entry(bench).or_default();
+            *nights += 1;
+            *newest = text(&row[4], "started_at")?.max(std::mem::take(newest));
         }
-        suites.sort_by(|a, b| {
-            let names = |s: &SuiteNights| (s.rig.clone(), s.rig_kind.clone(), s.suite.clone());
-            (&b.newest, names(a)).cmp(&(&a.newest, names(b)))
-        });
+        let is_named_twice = |bench: &Bench| {
+            let alike = found.keys().filter(|other| other.name() == bench.name());
+            alike.count() > 1
+        };
+        let suite = |(bench, (nights, newest)): (&Bench, &(usize, String))| {
+            let computer = bench.computer.as_ref().filter(|_| is_named_twice(bench));
+            let suite = SuiteNights {
+                rig: match computer {
+                    Some(computer) => format!("{} of {computer}", bench.rig),
+                    None => bench.rig.clone(),
+                },
+                rig_kind: bench.rig_kind.clone(),
+                suite: bench.suite.clone(),
+                nights: *nights,
+                newest: newest.clone(),
+            };
+            (suite, bench.clone())
+        };
+        let mut suites: Vec<(SuiteNights, Bench)> = found.iter().map(suite).collect();
+        suites.sort_by(|(a, a_key), (b, b_key)| (&b.newest, a_key).cmp(&(&a.newest, b_key)));
         Ok(suites)
     }
 
@@ -64,16 +110,29 @@ impl Catalogue {
     /// # Errors
     /// [`CatalogueError::NoNights`] if it selects none; if the catalogue cannot be read.
     pub fn nights(&mut self, filter: &Filter) -> Result<CatalogueNights, CatalogueError> {
-        let suites = self.suites()?;
+        let benches = self.benches()?;
+        let suites: Vec<SuiteNights> = benches.iter().map(|(suite, _)| suite.clone()).collect();
         let none = |found: NoSuchNights| CatalogueError::NoNights {
             place: self.place.clone(),
             found,
         };
         let of = filter.choose(&suites).map_err(none)?;
-        let key = [(&of.rig).into(), (&of.rig_kind).into(), (&of.suite).into()];
+        let chosen = benches.iter().find(|(suite, _)| suite == of);
+        let Some((_, bench)) = chosen else {
+            return Ok(CatalogueNights::default());
+        };
+        let key = [
+            (&bench.rig).into(),
+            (&bench.rig_kind).into(),
+            (&bench.suite).into(),
+        ];
         let mut nights = Vec::new();
         let mut outdated = 0;
         for row in self.rows(NIGHTS, &key)? {
+            let folder = text(&row[9], "folder")?;
+            if self.computer_of(&folder) != bench.computer.as_deref() {
+                continue;
+            }
             if row[3] == Value::Null {
                 outdated += 1;
                 continue;
@@ -100,6 +159,10 @@ impl Catalogue {
             history.add(&name, &unit, point);
         }
         for row in self.rows(ACCEPTANCES, &key[..1])? {
+            let store = text(&row[5], "store")?;
+            if self.computer_of(&store) != bench.computer.as_deref() {
+                continue;
+            }
             let accepted = Acceptance {
                 series: optional(&row[0]),
                 night: text(&row[1], "night_id")?,

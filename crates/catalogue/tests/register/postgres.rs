@@ -1,6 +1,7 @@
 //! The same catalogue on a PostgreSQL server.
 
 use skinrig_catalogue::{Access, Address, Catalogue, CatalogueError, Question};
+use skinrig_nightly::Night;
 use skinrig_nightly::trend::Filter;
 
 use crate::server::Server;
@@ -188,6 +189,64 @@ fn programs_that_register_a_folder_at_once_wait_for_each_other() {
         server.open().unwrap().status(lab.path()).unwrap().current,
         2
     );
+}
+
+#[test]
+fn benches_of_one_name_on_two_computers_keep_their_nights() {
+    let Some(server) = Server::start() else {
+        return;
+    };
+    let lab = Lab::with_sessions(0);
+    let [own, other] = ["own", "other"].map(|name| lab.path().join(name));
+    let mut central = server.open().unwrap();
+    synthetic::write_nights(&other, 3);
+    central.register_nights(&other).unwrap();
+    central
+        .replace_acceptances(&other, &[nights::accepted(None)])
+        .unwrap();
+    // As another computer would have registered them.
+    server.execute(&[
+        "UPDATE night SET folder = 'lab2-abcdef:/nights' || night_id",
+        "UPDATE night_acceptance SET store = 'lab2-abcdef:/nights'",
+    ]);
+    assert_eq!(central.suites().unwrap()[0].rig, "bench 1");
+    // They begin in the same seconds, under the same names, and measure something else.
+    synthetic::write_nights(&own, 2);
+    for night in ["00000", "00001"] {
+        let file = own.join(night).join("night.json");
+        let mut changed: Night = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+        changed.took_s += 1.0;
+        std::fs::write(&file, serde_json::to_vec(&changed).unwrap()).unwrap();
+    }
+    let done = central.register_nights(&own).unwrap();
+    assert_eq!((done.registered, done.unreadable.len()), (2, 0), "{done:?}");
+    let suites = central.suites().unwrap();
+    let of_lab2 = suites
+        .iter()
+        .position(|s| s.rig == "bench 1 of lab2-abcdef");
+    let [lab2, here] = of_lab2.map(|at| [at, 1 - at]).unwrap();
+    assert_eq!([suites[lab2].nights, suites[here].nights], [3, 2]);
+    for (at, accepted) in [(lab2, 1), (here, 0)] {
+        let filter = Filter {
+            rig: Some(suites[at].rig.clone()),
+            ..Filter::default()
+        };
+        let found = central.nights(&filter).unwrap().history;
+        assert_eq!(found.nights.len(), suites[at].nights);
+        assert_eq!(found.series[0].points.len(), suites[at].nights);
+        assert_eq!(found.accepted.len(), accepted);
+    }
+    let unclear = Filter {
+        rig: Some("bench 1".to_owned()),
+        ..Filter::default()
+    };
+    let refused = central.nights(&unclear).unwrap_err().to_string();
+    assert!(refused.contains("bench 1 of lab2-abcdef"), "{refused}");
+    // A changed night of this computer is still refused.
+    let copy = lab.path().join("copy");
+    synthetic::write_nights(&copy, 1);
+    let done = central.register_nights(&copy).unwrap();
+    assert_eq!((done.registered, done.unreadable.len()), (0, 1), "{done:?}");
 }
 
 #[test]

@@ -27,6 +27,9 @@ pub(crate) fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
         _ => 0,
     };
     let Nights { history, outdated } = nights(args, &source)?;
+    if let (Source::Catalogue(address), None) = (&source, &args.catalogue) {
+        errln!("note: judged the nights of {address}, which SKINRIG_CATALOGUE names");
+    }
     let report = judge(&history);
     let pattern = args.series.as_deref().unwrap_or("*");
     let series = series(pattern).map_err(|e| {

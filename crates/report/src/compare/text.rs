@@ -61,8 +61,12 @@ pub(super) const fn verdict(of: Option<Verdict>) -> &'static str {
 /// What the verdicts and intervals of several skins hold for; `None` for one.
 pub(super) fn together(result: &Result) -> Option<String> {
     let others = result.skins.len().checked_sub(1).filter(|n| *n > 1)?;
+    let all = match others {
+        2 => "both".to_owned(),
+        n => format!("all {n}"),
+    };
     Some(format!(
-        "verdicts and intervals hold for all {others} comparisons with A together"
+        "verdicts and intervals hold for {all} comparisons with A together"
     ))
 }
 
