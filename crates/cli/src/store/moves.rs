@@ -93,7 +93,7 @@ fn each<S: AsRef<Path>>(
         Some(first) => Err(Failure {
             exit: first.exit,
             message: format!(
-                "error: {} of {} sessions stay as they are\n  next: mend what is named above, then repeat the command",
+                "error: {} of {} sessions stay as they are\n  next: fix what is named above, then repeat the command",
                 failures.len(),
                 sessions.len()
             ),
@@ -146,6 +146,14 @@ fn put(
         )));
     };
     drop(reader);
+    // A damaged one could not be fetched back, and `skinrig salvage` needs its file.
+    let report = verify::<Rescan>(session).map_err(Failure::session)?;
+    if let Some(problem) = report.problems.first() {
+        return Err(Failure::input(format!(
+            "{shown}: expected a sound session, found a damaged one: {problem}\n  next: `skinrig verify {shown}` lists the damage, \
+             `skinrig salvage` copies the intact part"
+        )));
+    }
     let url = to.join(&name);
     let sent = Arc::new(AtomicU64::new(0));
     let phase = Phase::reading(

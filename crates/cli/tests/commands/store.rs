@@ -177,6 +177,17 @@ fn what_cannot_be_moved_stays_and_says_what_to_do() {
         .code(2)
         .expect_stderr(&["found another; choose another address"]);
     stays();
+    // A damaged one could not be fetched back.
+    let mut bytes = std::fs::read(&session).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 64].fill(0x55);
+    let damaged = lab.text("t/damaged.session.sqlite");
+    std::fs::write(&damaged, &bytes).unwrap();
+    store
+        .skinrig(&["store", "put", &damaged, "--to", "s3://lab/else"])
+        .code(2)
+        .expect_stderr(&["damaged", "next:"]);
+    assert!(std::fs::read(&damaged).unwrap() == bytes);
     // One failure leaves the others.
     let missing = lab.text("s/none.session.sqlite");
     let both = ["store", "put", &missing, &file, "--to", "s3://lab/else"];
