@@ -30,7 +30,7 @@ impl Bench {
 }
 
 /// Nights of a suite on a bench.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CatalogueNights {
     /// The nights. Their folders are paths where this computer has them, otherwise what the catalogue calls them.
     pub history: History,
@@ -110,17 +110,13 @@ impl Catalogue {
     /// # Errors
     /// [`CatalogueError::NoNights`] if it selects none; if the catalogue cannot be read.
     pub fn nights(&mut self, filter: &Filter) -> Result<CatalogueNights, CatalogueError> {
-        let benches = self.benches()?;
-        let suites: Vec<SuiteNights> = benches.iter().map(|(suite, _)| suite.clone()).collect();
+        let (suites, benches): (Vec<_>, Vec<_>) = self.benches()?.into_iter().unzip();
         let none = |found: NoSuchNights| CatalogueError::NoNights {
             place: self.place.clone(),
             found,
         };
-        let of = filter.choose(&suites).map_err(none)?;
-        let chosen = benches.iter().find(|(suite, _)| suite == of);
-        let Some((_, bench)) = chosen else {
-            return Ok(CatalogueNights::default());
-        };
+        let chosen = filter.choose(&suites).map_err(none)?;
+        let (of, bench) = (&suites[chosen], &benches[chosen]);
         let key = [
             (&bench.rig).into(),
             (&bench.rig_kind).into(),

@@ -143,7 +143,7 @@ pub fn load(path: &Path, filter: &Filter) -> Result<History, HistoryError> {
         expected: none.expected,
         found: none.found,
     };
-    let line = filter.choose(&suites).map_err(not_found)?;
+    let line = &suites[filter.choose(&suites).map_err(not_found)?];
     runtime(path)?.block_on(async {
         let mut conn = file::open(path, false).await?;
         let read = read::history(&mut conn, line).await;

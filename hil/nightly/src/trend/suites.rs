@@ -64,12 +64,12 @@ impl Filter {
             && fits(&self.rig_kind, &suite.rig_kind)
     }
 
-    /// The first of `suites` that it selects. Nights of two benches, or of a bench and its emulation, are never judged together.
+    /// Index of the first of `suites` that it selects. Nights of two benches, or of a bench and its emulation, are never judged together.
     ///
     /// # Errors
     /// [`NoSuchNights`] if it selects none.
-    pub fn choose<'a>(&self, suites: &'a [SuiteNights]) -> Result<&'a SuiteNights, NoSuchNights> {
-        let found = suites.iter().find(|suite| self.matches(suite));
+    pub fn choose(&self, suites: &[SuiteNights]) -> Result<usize, NoSuchNights> {
+        let found = suites.iter().position(|suite| self.matches(suite));
         found.ok_or_else(|| NoSuchNights {
             expected: format!(
                 "nights of {} on {}",
