@@ -109,7 +109,7 @@ fn counts(s: &StreamStats) -> Vec<(String, u64)> {
         ("wraps of the time base".into(), s.wraps),
         ("steps of the time base".into(), s.discontinuities),
         ("events outside the sensor".into(), s.out_of_geometry),
-        ("vectors at no multiple of 32 columns".into(), s.unaligned),
+        ("vectors not aligned to 32 columns".into(), s.unaligned),
         ("bytes of an unfinished word".into(), s.trailing_bytes),
     ]);
     rows.retain(|(name, n)| *n > 0 || name.starts_with("CD"));

@@ -77,7 +77,7 @@ fn one_depth(analysis: &Analysis, session: &Path) -> Result<(), Failure> {
     match depths[..] {
         [] | [_] => Ok(()),
         _ => Err(Failure::input(format!(
-            "{}: expected scored presses of one depth, found {} depths: errors at different depths do not repeat each other\n  \
+            "{}: expected scored presses of one depth, found {} depths: presses at different depths are not repetitions\n  \
              next: name a session of one depth with --from",
             session.display(),
             depths.len()

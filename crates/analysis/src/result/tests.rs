@@ -385,8 +385,8 @@ fn of_results() -> Vec<(Value, &'static str)> {
         ),
         (
             json!({"kind": "repeated_positions", "first": 50, "last": 58}),
-            "press 50 to press 58 have the same recorded position to the last digit, and other presses do not repeat so: if a table was \
-             filled in where rows were missing, errors there are not those of the skin; leave these presses out with `skinrig select`",
+            "press 50 to press 58 have the same recorded position to the last digit, unlike the others: if missing rows of a table were \
+             filled in, their errors say nothing about the skin; leave these presses out with `skinrig select`",
         ),
         (
             json!({"kind": "left_out_unknown", "rmse_mm": estimate(26.0), "extent_mm": 0.9}),

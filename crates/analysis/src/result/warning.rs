@@ -551,8 +551,8 @@ pub enum WarningCause {
     },
     /// Presses in a row with one recorded position, while the others have their own.
     #[error(
-        "{first} to {last} have the same recorded position to the last digit, and other presses do not repeat so: if a table was \
-         filled in where rows were missing, errors there are not those of the skin; leave these presses out with `skinrig select`"
+        "{first} to {last} have the same recorded position to the last digit, unlike the others: if missing rows of a table were filled in, \
+         their errors say nothing about the skin; leave these presses out with `skinrig select`"
     )]
     RepeatedPositions {
         /// The first of them.

@@ -105,7 +105,7 @@ fn broken_stream(stats: &StreamStats) -> Option<String> {
         (stats.skipped_words(), "words without a meaning"),
         (stats.dropped_before_address, "events without an address"),
         (stats.out_of_geometry, "events outside the sensor"),
-        (stats.unaligned, "vectors at no multiple of 32 columns"),
+        (stats.unaligned, "vectors not aligned to 32 columns"),
         (stats.discontinuities, "jumps of the time base"),
         (stats.trailing_bytes, "bytes of an unfinished word"),
     ];
