@@ -261,7 +261,8 @@ pub(crate) fn simulated(
             .tolerances
             .iter()
             .map(|t| format!("{} within {} {}", t.figure.name(), t.most, t.figure.unit()));
-        let parts = Parts::of_paper(&scene.parts).label();
+        let twin = scene.twin_of.as_ref().map(|of| format!("the twin of {of}"));
+        let parts = twin.or_else(|| Parts::of_paper(&scene.parts).label());
         let needs: Vec<String> = needs.chain(tolerances).chain(parts).collect();
         let needed_for = if needs.is_empty() {
             String::new()

@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use skinrig_model::level_bias::{is_measured_for, is_measured_over, is_measured_with};
 use skinrig_model::pulse::MAX_MARKED_PRESS;
 use skinrig_model::{PressRole, PulseTrain, SimLevel, SkinOutline, StereoGeometry};
-use skinrig_settings::{Collector, Diagnostics, Field, Finding, Settings, Span, open};
+use skinrig_settings::{Collector, Diagnostics, Field, Finding, Settings, Span, open, rewrite};
 
 use crate::file::hex;
 use crate::keys::{
@@ -48,6 +48,14 @@ impl Protocol {
     ) -> Result<Self, Diagnostics> {
         protocol(name, bytes, overrides, loader, true)
     }
+}
+
+/// Text of a protocol with the overrides applied: the same values, without comments.
+///
+/// # Errors
+/// [`Diagnostics`] for text that is not YAML, and for overrides of unknown keys. Values are not tested.
+pub fn protocol_with(name: &str, text: &str, overrides: &[String]) -> Result<String, Diagnostics> {
+    rewrite(name, text, overrides, ProtocolKeys::TABLE)
 }
 
 /// Reads a protocol; see [`Protocol::parse`].

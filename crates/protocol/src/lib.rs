@@ -47,6 +47,7 @@ mod svg;
 pub mod timing;
 
 pub use area::{Area, KeepOut, Surroundings};
+pub use assemble::protocol_with;
 pub use check::{PlanRule, Segment, Violation, check};
 pub use design::best_locations;
 pub use faults::{FaultPhase, FaultTime, InvalidFault, PlantedFault};

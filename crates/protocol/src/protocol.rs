@@ -131,6 +131,12 @@ pub struct Scene {
     /// The skin, if it differs from the published one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SimulatedSkin>,
+    /// Random events of the pixels, relative to the model's, 0.01 to 100.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<f64>,
+    /// The session that the scene was fitted to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twin_of: Option<String>,
     /// Camera 1 and camera 2 as drawn, if they are not at the published positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cameras: Option<[CameraModel; 2]>,
@@ -149,6 +155,20 @@ pub struct SimulatedSkin {
     pub creep_time: HostDuration,
     /// Brightness of a dent's flanks, relative to a matt white flank, 0.1 to 10.
     pub flank_brightness: f64,
+    /// Light that a dent takes away, relative to the published skin, 0.01 to 100.
+    pub light_loss: f64,
+    /// Standard deviation of the dent's position from press to press, per axis, mm; `None`: that of the scene's parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub press_scatter_mm: Option<f64>,
+    /// Standard deviation of the dent's depth as a share of it; `None`: that of the scene's parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth_scatter: Option<f64>,
+    /// Share of the presses that dent the skin little; `None`: that of the scene's parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weak_presses: Option<f64>,
+    /// Distance of the pod's centre from the lens, mm, up to 2.9; `None`: that of the scene's parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pod_offset_mm: Option<f64>,
 }
 
 /// Presses before everything else.

@@ -35,6 +35,7 @@ mod overrides;
 pub mod quantity;
 mod range;
 mod read;
+mod rewrite;
 mod scalar;
 mod setting;
 mod shape;
@@ -48,6 +49,7 @@ pub use given::given;
 pub use language::open;
 pub use quantity::Dimension;
 pub use range::ValueRange;
+pub use rewrite::rewrite;
 pub use setting::{
     Choice, NumberSpan, Numbers, OutOfRange, Row, Setting, Settings, in_unit, key_path, whole_units,
 };

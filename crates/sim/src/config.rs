@@ -137,6 +137,8 @@ pub struct SimConfig {
     pub geometric: GeometricConfig,
     /// Constants of the optical level.
     pub optical: OpticalConfig,
+    /// The session that the scene was fitted to, if it is a twin.
+    pub twin_of: Option<String>,
     /// Earlier contacts, skin frame, for further legs of a run.
     pub pressed_before: Vec<Point2>,
     /// Number of earlier legs. Each leg has its own noise; the devices and the skin stay.
@@ -191,6 +193,7 @@ impl SimConfig {
             trigger_box: TriggerBoxConfig::default(),
             geometric: GeometricConfig::default(),
             optical: OpticalConfig::default(),
+            twin_of: None,
             pressed_before: Vec::new(),
             legs_before: 0,
             faults: Vec::new(),

@@ -93,7 +93,11 @@ pub fn in_real_time(mut rig: Rig) -> Rig {
 /// Level and scene.
 fn name(config: &SimConfig) -> String {
     let is_optical = config.level == SimLevel::Optical;
-    match config.optical.parts.label().filter(|_| is_optical) {
+    let scene = match &config.twin_of {
+        Some(session) => Some(format!("twin of {session}")),
+        None => config.optical.parts.label(),
+    };
+    match scene.filter(|_| is_optical) {
         Some(scene) => format!("simulated ({}, {scene})", config.level),
         None => format!("simulated ({})", config.level),
     }

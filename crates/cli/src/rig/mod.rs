@@ -6,6 +6,7 @@ pub mod gates;
 pub mod inputs;
 pub mod planted;
 mod requests;
+mod scene;
 pub mod tolerated;
 
 use std::path::Path;
@@ -14,7 +15,6 @@ use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, Clock, Rig};
 use skinrig_model::{HostTime, InterruptionKind, Point2, RunHeader, SimLevel, StereoGeometry};
 use skinrig_protocol::{PlantedFault, Protocol};
-use skinrig_sim::optical::{OpticalConfig, Parts};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
 use skinrig_sim::{FaultWatch, SimConfig, in_real_time, watched_rig};
 
@@ -67,16 +67,10 @@ pub(crate) fn simulated_after(
         ..SimConfig::new(seed, level)
     };
     config.outline = protocol.surroundings.outline;
-    config.optical.parts = Parts::of_paper(&protocol.scene.parts);
+    config.optical = scene::optical(&protocol.scene);
+    config.twin_of.clone_from(&protocol.scene.twin_of);
     if let Some(skin) = protocol.scene.skin {
         config.skin_thickness_mm = skin.thickness_mm;
-        config.optical = OpticalConfig {
-            attenuation_per_mm: 1.0 / skin.attenuation_length_mm,
-            creep_fraction: skin.creep_share,
-            creep_time_ms: 1e3 * skin.creep_time.as_secs_f64(),
-            flank_gain: skin.flank_brightness,
-            ..config.optical
-        };
     }
     if let Some(cameras) = protocol.scene.cameras {
         config.nominal = StereoGeometry { cameras };

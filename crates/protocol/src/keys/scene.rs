@@ -30,6 +30,12 @@ pub(crate) struct SceneKeys {
     parts: Option<Vec<ScenePart>>,
     /// A skin other than the published one. Needs the optical level.
     skin: Option<SkinKeys>,
+    /// Random events of the pixels, relative to the model's. Needs the optical level.
+    #[setting(min = 0.01, max = 100.0, example = "1.5")]
+    noise: Option<f64>,
+    /// The session that this scene was fitted to, as `skinrig twin` writes it. Needs the optical level.
+    #[setting(example = "K7-03")]
+    twin_of: Option<String>,
     /// Cameras at other places than in the published setup.
     cameras: Option<SceneCameras>,
 }
@@ -94,6 +100,23 @@ pub(crate) struct SkinKeys {
     /// Brightness of the flanks of a dent, relative to a matt white flank. Cameras detect a press by these flanks.
     #[setting(default = "1.8", min = 0.1, max = 10.0)]
     flank_brightness: f64,
+    /// Light that a dent takes away, relative to the published skin.
+    #[setting(default = "1", min = 0.01, max = 100.0)]
+    light_loss: f64,
+    /// Standard deviation of the dent's position about the tip, per axis, from press to press. Without: that of the part
+    /// `press_scatter`, if it is listed.
+    #[setting(min = 0.0, max = 20.0, example = "1.2 mm")]
+    press_scatter_mm: Option<f64>,
+    /// Standard deviation of the dent's depth, as a share of the depth, from press to press. Without: that of the part
+    /// `press_scatter`, if it is listed.
+    #[setting(min = 0.0, max = 50.0, example = "8 %")]
+    depth_scatter_percent: Option<f64>,
+    /// Share of the presses that dent the skin little. Without: that of the part `weak_presses`, if it is listed.
+    #[setting(min = 0.0, max = 100.0, example = "3 %")]
+    weak_presses_percent: Option<f64>,
+    /// Distance of the round pod's centre from the lens. Without: that of the part `pod_refraction`, if it is listed.
+    #[setting(min = 0.0, max = 2.9, example = "1 mm")]
+    pod_offset_mm: Option<f64>,
 }
 
 /// The simulated cameras as drawn; the true ones differ a little, by the run's seed.
@@ -112,6 +135,7 @@ impl SceneKeys {
     /// The scene with its level decided. Cameras aim at `centre` unless the file says otherwise. Differences between levels are known for
     /// presses as measured.
     pub(crate) fn scene(self, centre: Point2, is_measured: bool) -> Scene {
+        let is_optical = self.optical_key().is_some();
         let tolerances = self.tolerances.as_ref().map(ToleranceKeys::all);
         let needs = match (self.needs, self.level, &tolerances) {
             (Some(needs), ..) => needs,
@@ -121,7 +145,6 @@ impl SceneKeys {
         let tolerances = tolerances.unwrap_or_default();
         let is_known = is_measured && self.cameras.is_none();
         let unmeasured = !is_known && !tolerances.is_empty();
-        let is_optical = self.skin.is_some() || self.parts.is_some();
         let own_level = (is_optical || unmeasured).then_some(SimLevel::Optical);
         Scene {
             level: self
@@ -133,10 +156,25 @@ impl SceneKeys {
             level_is_named: self.level.is_some(),
             parts: self.parts.unwrap_or_default(),
             skin: self.skin.map(SkinKeys::skin),
+            noise: self.noise,
+            twin_of: self.twin_of,
             cameras: self
                 .cameras
                 .map(|c| [c.camera1.model(centre), c.camera2.model(centre)]),
         }
+    }
+
+    /// The key that only the optical level models, if there is one.
+    fn optical_key(&self) -> Option<&'static str> {
+        let keys = [
+            ("skin", self.skin.is_some()),
+            ("parts", self.parts.is_some()),
+            ("noise", self.noise.is_some()),
+            ("twin_of", self.twin_of.is_some()),
+        ];
+        keys.into_iter()
+            .find(|(_, given)| *given)
+            .map(|(key, _)| key)
     }
 
     fn sufficient(self, field: &Field, out: &mut Collector) -> Option<Self> {
@@ -156,14 +194,9 @@ impl SceneKeys {
                     .found(format!("`{}`", part.name()));
             }
         }
-        let optical_key = match (&self.skin, &self.parts) {
-            (Some(_), _) => Some("skin"),
-            (None, Some(_)) => Some("parts"),
-            (None, None) => None,
-        };
         if let Some(level) = self.level
             && level < SimLevel::Optical
-            && let Some(key) = optical_key
+            && let Some(key) = self.optical_key()
         {
             let at = field.at("level");
             out.error(at.span, "scene.level", "this level does not model the skin")
@@ -269,6 +302,11 @@ impl SkinKeys {
             creep_share: self.creep_percent / 100.0,
             creep_time: self.creep_time,
             flank_brightness: self.flank_brightness,
+            light_loss: self.light_loss,
+            press_scatter_mm: self.press_scatter_mm,
+            depth_scatter: self.depth_scatter_percent.map(|p| p / 100.0),
+            weak_presses: self.weak_presses_percent.map(|p| p / 100.0),
+            pod_offset_mm: self.pod_offset_mm,
         }
     }
 }

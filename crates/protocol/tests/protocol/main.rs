@@ -10,6 +10,7 @@ mod missing;
 mod notify;
 mod online;
 mod remaining;
+mod rewritten;
 mod rig;
 mod scene;
 mod schedules;

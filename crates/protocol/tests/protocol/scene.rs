@@ -121,6 +121,54 @@ fn parts_are_listed_once_and_need_the_optical_level() {
 }
 
 #[test]
+fn constants_of_a_skin_need_the_optical_level() {
+    let changed = |change: &str| parse(&shipped("demo.yaml"), &["scene.needs=[motion]", change]);
+    for change in [
+        "scene.skin.light_loss=0.7",
+        "scene.skin.press_scatter=1.2 mm",
+        "scene.skin.depth_scatter=8 %",
+        "scene.skin.weak_presses=3 %",
+        "scene.skin.pod_offset=1 mm",
+        "scene.noise=1.5",
+        "scene.twin_of=K7",
+    ] {
+        let scene = changed(change)
+            .unwrap_or_else(|e| panic!("{change}: {e}"))
+            .scene;
+        assert_eq!(scene.level, SimLevel::Optical, "{change}");
+        let key = change.split(['.', '=']).nth(1).unwrap();
+        let both = parse(&shipped("demo.yaml"), &[change, "scene.level=geometric"]);
+        let error = both.unwrap_err().to_string();
+        assert!(
+            error.contains(&format!("because of `scene.{key}`")),
+            "{error}"
+        );
+    }
+    let skin = changed("scene.skin.weak_presses=3 %")
+        .unwrap()
+        .scene
+        .skin
+        .unwrap();
+    assert_eq!((skin.weak_presses, skin.light_loss), (Some(0.03), 1.0));
+    assert_eq!(
+        (
+            skin.press_scatter_mm,
+            skin.depth_scatter,
+            skin.pod_offset_mm
+        ),
+        (None, None, None)
+    );
+    // The centre of a pod of 3 mm lies within it.
+    for change in [
+        "scene.skin.pod_offset=3 mm",
+        "scene.noise=0",
+        "scene.skin.light_loss=0",
+    ] {
+        assert!(changed(change).is_err(), "{change}");
+    }
+}
+
+#[test]
 fn the_shipped_scene_of_the_paper_has_every_part() {
     let protocol = parse(&shipped("paper.yaml"), &[]).unwrap();
     assert_eq!(protocol.scene.parts, ScenePart::ALL);

@@ -143,6 +143,23 @@ impl OpticalConfig {
         }
     }
 
+    /// The same constants with so many times the random events of the pixels; hot pixels stay.
+    #[must_use]
+    pub fn with_noise(self, factor: f64) -> Self {
+        let mut parts = self.parts;
+        if let Some(noise) = &mut parts.uneven_noise {
+            noise.leak_hz *= factor;
+            noise.shot_hz *= factor;
+            noise.dark_hz *= factor;
+        }
+        Self {
+            leak_hz: factor * self.leak_hz,
+            shot_hz: factor * self.shot_hz,
+            parts,
+            ..self
+        }
+    }
+
     /// With the noise of the part, if it is on.
     pub(super) const fn with_uneven_noise(self) -> Self {
         match self.parts.uneven_noise {

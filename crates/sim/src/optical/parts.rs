@@ -37,7 +37,7 @@ pub struct Parts {
 }
 
 /// Normal scatter of the dent about the tip, equal for both cameras.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct PressScatter {
     /// Standard deviation per axis, mm.
     pub offset_mm: f64,
@@ -202,9 +202,12 @@ impl Parts {
         }
     }
 
-    /// `scene paper`, with the parts that it lacks; `None` without any part.
+    /// `scene paper`, with the parts that it lacks; `own parts` with other constants; `None` without any part.
     #[must_use]
     pub fn label(&self) -> Option<String> {
+        if !self.is_of_paper() {
+            return Some("own parts".to_owned());
+        }
         let has = |part: &ScenePart| match part {
             ScenePart::PressScatter => self.press_scatter.is_some(),
             ScenePart::WeakPresses => self.weak_presses.is_some(),
@@ -223,6 +226,23 @@ impl Parts {
             (false, true) => Some("scene paper".to_owned()),
             (false, false) => Some(format!("scene paper without {}", lacks.join(", "))),
         }
+    }
+
+    /// Whether every part that is on has the paper's constants.
+    fn is_of_paper(&self) -> bool {
+        fn same<T: PartialEq>(part: Option<T>, paper: Option<T>) -> bool {
+            part.is_none() || part == paper
+        }
+        let paper = Self::PAPER;
+        same(self.press_scatter, paper.press_scatter)
+            && same(self.weak_presses, paper.weak_presses)
+            && same(self.slow_recovery, paper.slow_recovery)
+            && same(self.pod_refraction, paper.pod_refraction)
+            && same(self.uneven_light, paper.uneven_light)
+            && same(self.uneven_pixels, paper.uneven_pixels)
+            && same(self.uneven_noise, paper.uneven_noise)
+            && same(self.dark_latency, paper.dark_latency)
+            && same(self.readout, paper.readout)
     }
 
     /// Whether dents differ from press to press.
