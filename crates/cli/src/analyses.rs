@@ -42,6 +42,11 @@ pub(crate) fn scene_path(session: &Path) -> PathBuf {
     beside(session, ".scene.html")
 }
 
+/// Path of the page of `twin`; its results and its protocol have the same name with other endings.
+pub(crate) fn twin_path(session: &Path) -> PathBuf {
+    beside(session, ".twin.html")
+}
+
 fn path(session: &Path, name: Option<&str>, ending: &str) -> PathBuf {
     match name {
         None => beside(session, ending),

@@ -49,6 +49,16 @@ pub(crate) const SCENE: ResultsKind = ResultsKind {
     command: "skinrig scene predict",
 };
 
+/// Results of `skinrig twin`.
+pub(crate) const TWIN: ResultsKind = ResultsKind {
+    format: "skinrig-twin",
+    version: 1,
+    key: "twin",
+    ending: ".twin.json",
+    words: "twin",
+    command: "skinrig twin",
+};
+
 /// The session of the results, as it was.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(crate) struct SessionIdentity {

@@ -64,6 +64,7 @@ mod subprocess;
 mod supervise;
 mod tag;
 mod tradeoff;
+mod twin;
 mod verify;
 mod version;
 mod view;
@@ -162,6 +163,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Report(a) => analyze::report(a, json),
         Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, output),
+        Command::Twin(a) => twin::twin(a, &command_line(arguments), output),
         Command::Scene(a) => scene::scene(a, &command_line(arguments), output),
         Command::Online(a) => online::online(a, output),
         Command::Verify(a) => verify::verify(a, json),

@@ -180,7 +180,7 @@ pub struct Simulation {
 }
 
 /// Name of a protocol that is not in a file.
-const NO_FILE: &str = "protocol.yaml";
+pub(crate) const NO_FILE: &str = "protocol.yaml";
 
 /// Runs a campaign on the simulated rig, through the controller and the recorder, and returns the path of the sealed session.
 /// `control` can end it, as ctrl-C ends `skinrig run`.

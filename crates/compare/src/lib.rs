@@ -14,6 +14,7 @@ pub mod scene;
 mod sequential;
 mod subject;
 mod table;
+pub mod twin;
 
 pub use causes::{Causes, Contribution, CrossEvaluation, Factor, FactorMeasurement, Reanalysis};
 pub use comparability::{Difference, RULES, Rule, Severity, differences, fact_differences};

@@ -25,6 +25,7 @@ pub mod style;
 pub mod svg;
 pub mod tradeoff;
 pub mod trend;
+pub mod twin;
 
 mod detector;
 mod document;

@@ -28,7 +28,7 @@ mod window;
 
 pub use earlier_mismatch::EarlierMismatch;
 pub use error::{LookFault, NotLearnt, ResultsError};
-pub use event_statistics::event_statistics;
+pub use event_statistics::{event_statistics, press_statistics};
 pub use events::{Rescan, SessionEvents};
 pub use learn_skin::learn_skin;
 pub use origin::{Origin, differences_from_optical};

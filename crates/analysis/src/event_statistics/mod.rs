@@ -9,7 +9,7 @@ mod presses;
 mod tests;
 mod values;
 
-pub use self::presses::{PressCourse, PressPolarity};
+pub use self::presses::{PressCourse, PressPolarity, PressStatistics, PressStatisticsCollector};
 pub use self::values::{Bin, EventStatistics, IntervalLaw, Ring};
 
 use self::counter::Counter;

@@ -7,6 +7,7 @@ mod evaluate;
 mod files;
 mod groups;
 mod scene;
+mod twin;
 mod values;
 
 use std::path::PathBuf;
@@ -31,6 +32,7 @@ pub(crate) use self::files::{
 };
 pub(crate) use self::groups::{command, parse};
 pub(crate) use self::scene::{SceneArgs, SceneCheckArgs, SceneCommand, ScenePredictArgs};
+pub(crate) use self::twin::TwinArgs;
 pub(crate) use self::values::StopRule;
 use crate::catalogue::args::CatalogueArgs;
 use crate::exit::Exit;
@@ -230,6 +232,16 @@ pub(crate) enum Command {
         skinrig scene predict sessions/NAME.session.sqlite"
     )]
     Scene(SceneArgs),
+
+    /// Fit the simulated skin that resembles the skin of a session, and predict errors of other presses with it.
+    #[command(
+        after_help = "Examples:\n  skinrig twin sessions/NAME.session.sqlite\n  \
+        skinrig twin sessions/NAME.session.sqlite --set depth=3mm\n  \
+        skinrig twin IMPORTED.session.sqlite --protocol protocols/paper.yaml\n\n\
+        The fit sees the calibration presses alone; the scored ones test it. The twin is a protocol that every command takes.\n\
+        Prediction of the changed protocol (--set) takes the time of the fit again."
+    )]
+    Twin(TwinArgs),
 
     /// Replay a session as a live source: how soon touches are felt, where, and how often wrongly.
     #[command(

@@ -2,6 +2,7 @@
 
 mod check;
 mod predict;
+pub(crate) mod replicates;
 
 use crate::args::{SceneArgs, SceneCommand};
 use crate::exit::Outcome;

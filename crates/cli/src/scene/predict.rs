@@ -1,26 +1,22 @@
 //! `skinrig scene predict`: figures of a session against those of simulated sessions of its protocol.
 
-use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::path::Path;
 
 use skinrig_compare::scene::{LEAST_REPLICATES, SessionFigures, predict as compared};
-use skinrig_controller::ControlHandle;
-use skinrig_model::{RunEnd, RunHeader, StopReason};
-use skinrig_recorder::SessionReader;
+use skinrig_model::RunHeader;
 use skinrig_report::scene_prediction::{ScenePrediction, page, terminal_text};
-use skinrig_results::{AlignedSession, Origin, RigDocument, SessionEvents, event_statistics};
+use skinrig_results::{AlignedSession, SessionEvents, event_statistics};
 
 use crate::analyses::scene_path;
 use crate::analysis_request::AnalysisRequest;
 use crate::args::ScenePredictArgs;
 use crate::beside_session::{SCENE, SessionIdentity};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::library::{ProtocolSource, Simulation, simulate};
 use crate::paths::file_name;
 use crate::phase::Phase;
 use crate::provenance::origin_in_words;
 use crate::results::{check_writable, open, write, write_named};
-use crate::signals::leave_on_ctrl_c;
+use crate::scene::replicates::{Replicates, Source, each, ran_through, seeds};
 use crate::terminal::Output;
 
 /// A session opened for its figures.
@@ -49,34 +45,37 @@ pub(super) fn predict(args: &ScenePredictArgs, command_line: &str, output: Outpu
         )
     })?;
     drop(phase);
-    let simulations = Simulations::of(&session.header, args, command_line)?;
-    let stop = leave_on_ctrl_c().map_err(Failure::internal)?;
-    let phase = Phase::steps("simulating (ctrl-C leaves)", args.replicates);
+    let replicates_of = Replicates::of(
+        &Source {
+            header: &session.header,
+            session: path,
+            protocol: args.protocol.as_deref(),
+            folder: args.sessions.as_deref(),
+            command_line,
+        },
+        &args.overrides,
+        args.level.clone(),
+    )?;
+    let seeds = seeds(args.seed, args.replicates, session.header.seed)?;
+    let of_replicate =
+        |aligned, at: &Path| figures(aligned, at, || "its analysis is INVALID".to_owned());
+    let simulated = each(&seeds, "simulating", |seed| {
+        replicates_of.simulate(&[], seed, of_replicate)
+    })?;
+    let last = simulated.found.last();
     let mut found = ScenePrediction {
         session: file_name(path),
         origin: origin_in_words(&session.header),
-        scene: String::new(),
-        changed: simulations.changed.clone(),
-        seeds: Vec::new(),
-        failed: Vec::new(),
+        scene: last.map_or_else(String::new, |(_, replicate)| {
+            replicate.header.rig_name.clone()
+        }),
+        changed: replicates_of.changed.clone(),
+        seeds: simulated.seeds(),
+        failed: simulated.failed.clone(),
         figures: Vec::new(),
     };
-    let mut replicates = Vec::new();
-    for (done, seed) in (1..).zip(simulations.seeds.iter().copied()) {
-        match simulations.one(seed)? {
-            Ok(replicate) => {
-                found.scene = replicate.header.rig_name;
-                found.seeds.push(seed);
-                replicates.push(replicate.figures);
-            }
-            Err(why) => found.failed.push((seed, why.message)),
-        }
-        phase.step(done);
-        if stop.load(Ordering::Relaxed) {
-            break;
-        }
-    }
-    drop(phase);
+    let replicates = simulated.found.iter();
+    let replicates: Vec<SessionFigures> = replicates.map(|(_, r)| r.figures.clone()).collect();
     if replicates.len() < LEAST_REPLICATES {
         return Err(too_few(&found, args));
     }
@@ -106,35 +105,15 @@ pub(super) fn predict(args: &ScenePredictArgs, command_line: &str, output: Outpu
             json_path.display()
         );
     }
-    let ended = found.seeds.len() + found.failed.len();
-    if ended < args.replicates as usize {
+    if simulated.interrupted {
         errln!(
-            "INTERRUPTED after {ended} of {} simulated sessions",
+            "INTERRUPTED after {} of {} simulated sessions",
+            simulated.tried(),
             args.replicates
         );
         return Ok(Exit::Stopped);
     }
     Ok(Exit::Ok)
-}
-
-/// Rejects what a simulated run is unlike, whatever its scene: presses after a break follow other ones, and a part has other
-/// figures than the whole.
-fn ran_through(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
-    let legs = reader.legs().map_err(Failure::session)?.len();
-    let found = match reader.end().map_err(Failure::session)? {
-        _ if legs > 1 => format!("{legs} legs: it was resumed"),
-        Some((_, RunEnd::Completed)) => return Ok(()),
-        Some((_, RunEnd::Stopped(StopReason::Decided(_)))) => {
-            "one that its `stop` ended".to_owned()
-        }
-        Some(_) => "one that was ended before".to_owned(),
-        None => "one without an end".to_owned(),
-    };
-    Err(Failure::input(format!(
-        "{}: expected a session that ran through, as the simulated ones do, found {found}\n  next: take a session of the same skin \
-         that ran through",
-        path.display()
-    )))
 }
 
 /// Fewer simulated sessions than a prediction needs.
@@ -172,103 +151,4 @@ fn figures(
         header,
         figures: SessionFigures::of(&analysis, &cameras),
     })
-}
-
-/// The simulated sessions of a protocol.
-struct Simulations<'a> {
-    protocol: ProtocolSource,
-    overrides: Vec<String>,
-    /// Overrides that the session does not have.
-    changed: Vec<String>,
-    level: Option<String>,
-    seeds: Vec<u64>,
-    /// Where they are kept until they are analysed.
-    folder: PathBuf,
-    command_line: &'a str,
-}
-
-impl<'a> Simulations<'a> {
-    fn of(
-        header: &RunHeader,
-        args: &ScenePredictArgs,
-        command_line: &'a str,
-    ) -> Result<Self, Failure> {
-        let origin = Origin::of(header);
-        let (protocol, mut overrides) = match &args.protocol {
-            Some(file) => (ProtocolSource::File(file.clone()), Vec::new()),
-            None if origin == Some(Origin::Imported) => {
-                return Err(Failure::input(format!(
-                    "{}: expected a session that a protocol recorded, found an import\n  next: --protocol FILE names the protocol to \
-                     simulate",
-                    args.session.display()
-                )));
-            }
-            None => (
-                ProtocolSource::Text(header.protocol_text.clone()),
-                header.overrides.clone(),
-            ),
-        };
-        overrides.extend(args.overrides.iter().cloned());
-        // The level of the recording goes with its own protocol; a changed one may need another.
-        let is_own = args.protocol.is_none() && args.overrides.is_empty();
-        let own_level = || {
-            let document: RigDocument = serde_json::from_str(&header.rig_json).ok()?;
-            let level = document.rig["level"].as_str()?;
-            is_own.then(|| level.to_owned())
-        };
-        let named = args.protocol.iter().map(|file| file.display().to_string());
-        Ok(Self {
-            protocol,
-            overrides,
-            changed: named.chain(args.overrides.iter().cloned()).collect(),
-            level: args.level.clone().or_else(own_level),
-            seeds: seeds(
-                args.seed.unwrap_or(header.seed.wrapping_add(1)),
-                args.replicates,
-                header.seed,
-            )?,
-            folder: args.sessions.clone().unwrap_or_else(std::env::temp_dir),
-            command_line,
-        })
-    }
-
-    /// Simulates, records and analyses one session; the inner error says why it cannot be analysed.
-    fn one(&self, seed: u64) -> Result<Result<Opened, Failure>, Failure> {
-        let folder = tempfile::Builder::new()
-            .prefix("skinrig-scene-")
-            .tempdir_in(&self.folder)
-            .map_err(|e| {
-                Failure::input(format!(
-                    "{}: no folder for a simulated session: {e}\n  next: --sessions names another folder",
-                    self.folder.display()
-                ))
-            })?;
-        let path = simulate(
-            Simulation {
-                protocol: self.protocol.clone(),
-                overrides: self.overrides.clone(),
-                folder: folder.path().to_owned(),
-                level: self.level.clone(),
-                seed: Some(seed),
-                command_line: self.command_line.to_owned(),
-            },
-            ControlHandle::new(),
-        )?;
-        let opened = open(&path, AnalysisRequest::default());
-        let invalid = || "its analysis is INVALID".to_owned();
-        Ok(opened.and_then(|(aligned, _)| figures(aligned, &path, invalid)))
-    }
-}
-
-/// So many seeds from `first` on, without that of the session: it would be simulated again.
-fn seeds(first: u64, n: u32, own: u64) -> Result<Vec<u64>, Failure> {
-    let seeds = (first..=u64::MAX).filter(|seed| *seed != own);
-    let seeds: Vec<u64> = seeds.take(n as usize).collect();
-    if seeds.len() < n as usize {
-        return Err(Failure::input(format!(
-            "--seed: expected {n} further seeds, found {first}, which has {} to the largest",
-            seeds.len()
-        )));
-    }
-    Ok(seeds)
 }

@@ -65,5 +65,6 @@ mod terminal_picture;
 mod tours;
 mod tradeoff;
 mod trend;
+mod twin;
 mod variants;
 mod watch;

@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::Analysis;
-use skinrig_analysis::event_statistics::{EventStatistics, PressCourse, PressPolarity};
+use skinrig_analysis::event_statistics::{
+    EventStatistics, PressCourse, PressPolarity, PressStatistics,
+};
 use skinrig_analysis::metrics::quantile;
 use skinrig_analysis::result::{PressResult, PressView};
 
@@ -53,7 +55,7 @@ pub enum SessionFigure {
 
 /// Scale on which replicates are taken for normal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Scale {
+pub(crate) enum Scale {
     Linear,
     Logarithm,
     /// Arcsine of the root, of a share.
@@ -61,7 +63,7 @@ pub(super) enum Scale {
 }
 
 impl Scale {
-    pub(super) fn of(self, x: f64) -> f64 {
+    pub(crate) fn of(self, x: f64) -> f64 {
         match self {
             Self::Linear => x,
             Self::Logarithm => libm::log(x),
@@ -69,7 +71,7 @@ impl Scale {
         }
     }
 
-    pub(super) fn back(self, x: f64) -> f64 {
+    pub(crate) fn back(self, x: f64) -> f64 {
         match self {
             Self::Linear => x,
             Self::Logarithm => libm::exp(x),
@@ -102,7 +104,7 @@ impl SessionFigure {
         Self::RepeatStd,
     ];
 
-    pub(super) const fn scale(self) -> Scale {
+    pub(crate) const fn scale(self) -> Scale {
         match self {
             Self::Rise | Self::Fading => Scale::Linear,
             Self::OnAtPress
@@ -136,6 +138,21 @@ impl SessionFigures {
     /// Of an analysis and the statistics of its cameras. A figure that does not exist, or is no number, is left out.
     #[must_use]
     pub fn of(analysis: &Analysis, cameras: &[EventStatistics]) -> Self {
+        let around = cameras.iter().map(|c| PressStatistics {
+            polarity: c.polarity,
+            course: c.course.clone(),
+        });
+        let mut found = Self::of_presses(analysis, &around.collect::<Vec<_>>());
+        for (value, figure) in found.values.iter_mut().zip(SessionFigure::ALL) {
+            let of_stream = of_stream(figure, cameras);
+            *value = value.or(of_stream.filter(|x| figure.scale().of(*x).is_finite()));
+        }
+        found
+    }
+
+    /// Of an analysis and the statistics of its cameras around the presses: without the figures of whole streams.
+    #[must_use]
+    pub fn of_presses(analysis: &Analysis, cameras: &[PressStatistics]) -> Self {
         let values = SessionFigure::ALL.map(|figure| {
             let value = value(figure, analysis, cameras);
             value.filter(|x| figure.scale().of(*x).is_finite())
@@ -143,6 +160,16 @@ impl SessionFigures {
         Self {
             values,
             presses: analysis.scored.located_rate.n,
+        }
+    }
+
+    /// With these values.
+    #[cfg(test)]
+    pub(crate) fn with(values: &[(SessionFigure, f64)]) -> Self {
+        let of = |figure| values.iter().find(|(f, _)| *f == figure).map(|(_, x)| *x);
+        Self {
+            values: SessionFigure::ALL.map(of),
+            presses: 40,
         }
     }
 
@@ -154,8 +181,25 @@ impl SessionFigures {
     }
 }
 
-fn value(figure: SessionFigure, analysis: &Analysis, cameras: &[EventStatistics]) -> Option<f64> {
+/// A figure of all events of the streams.
+fn of_stream(figure: SessionFigure, cameras: &[EventStatistics]) -> Option<f64> {
     let mean = |of: fn(&EventStatistics) -> Option<f64>| mean(cameras.iter().map(of));
+    match figure {
+        SessionFigure::Dispersion => mean(|c| c.dispersion),
+        SessionFigure::Neighbours => mean(|c| {
+            let chance = c.correlation_by_chance.filter(|c| *c > 0.0)?;
+            let ring = c.correlation.iter().find(|r| r.distance_px == 8.0)?;
+            Some(ring.active / chance)
+        }),
+        SessionFigure::ActivePixels => mean(|c| Some(c.active_pixels)),
+        SessionFigure::BusiestPixels => mean(|c| c.hottest_share),
+        SessionFigure::EqualTimes => mean(|c| c.equal_times),
+        _ => None,
+    }
+}
+
+fn value(figure: SessionFigure, analysis: &Analysis, cameras: &[PressStatistics]) -> Option<f64> {
+    let mean = |of: fn(&PressStatistics) -> Option<f64>| mean(cameras.iter().map(of));
     let polarity = |events: fn(&PressPolarity) -> (u64, Option<f64>)| {
         let both = cameras
             .iter()
@@ -187,15 +231,11 @@ fn value(figure: SessionFigure, analysis: &Analysis, cameras: &[EventStatistics]
             let widths = views(analysis).flatten().filter_map(|v| v.width_u);
             median(widths.collect())
         }
-        SessionFigure::Dispersion => mean(|c| c.dispersion),
-        SessionFigure::Neighbours => mean(|c| {
-            let chance = c.correlation_by_chance.filter(|c| *c > 0.0)?;
-            let ring = c.correlation.iter().find(|r| r.distance_px == 8.0)?;
-            Some(ring.active / chance)
-        }),
-        SessionFigure::ActivePixels => mean(|c| Some(c.active_pixels)),
-        SessionFigure::BusiestPixels => mean(|c| c.hottest_share),
-        SessionFigure::EqualTimes => mean(|c| c.equal_times),
+        SessionFigure::Dispersion
+        | SessionFigure::Neighbours
+        | SessionFigure::ActivePixels
+        | SessionFigure::BusiestPixels
+        | SessionFigure::EqualTimes => None,
         SessionFigure::Located => scored.located_rate.value,
         SessionFigure::Rmse => scored.rmse_mm.value,
         SessionFigure::RepeatStd => scored.repeat_std_mm.value,

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_statistics::distributions::{student_cdf, student_quantile};
 use skinrig_statistics::holm;
 
+pub(crate) use figure::Scale;
 pub use figure::{SessionFigure, SessionFigures};
 
 /// Fewest replicates from which a figure is predicted.

@@ -3,7 +3,7 @@
 
 mod figure;
 mod page;
-mod words;
+pub(crate) mod words;
 
 use serde::{Deserialize, Serialize};
 use skinrig_compare::scene::FigurePrediction;

@@ -5,31 +5,31 @@ use skinrig_compare::scene::SessionFigure;
 use crate::format::number;
 
 /// A figure in words.
-pub(super) struct Words {
-    pub(super) name: &'static str,
+pub(crate) struct Words {
+    pub(crate) name: &'static str,
     unit: &'static str,
     /// Factor from the figure's unit to that of the text, and digits after the point.
     scale: f64,
     digits: usize,
     /// What a value above the prediction means, before "than modelled".
-    pub(super) higher: &'static str,
-    pub(super) lower: &'static str,
+    pub(crate) higher: &'static str,
+    pub(crate) lower: &'static str,
 }
 
 impl Words {
-    pub(super) fn value(&self, x: Option<f64>) -> String {
+    pub(crate) fn value(&self, x: Option<f64>) -> String {
         number(x.map(|x| x * self.scale), self.digits)
     }
 
     /// The unit after a value.
-    pub(super) fn unit(&self) -> String {
+    pub(crate) fn unit(&self) -> String {
         match self.unit {
             "" => String::new(),
             unit => format!(" {unit}"),
         }
     }
 
-    pub(super) fn unit_in_parentheses(&self) -> String {
+    pub(crate) fn unit_in_parentheses(&self) -> String {
         match self.unit {
             "" => String::new(),
             unit => format!(" ({unit})"),
@@ -57,7 +57,7 @@ const PERCENT: (&str, f64, usize) = ("%", 100.0, 1);
 const MM: (&str, f64, usize) = ("mm", 1.0, 3);
 const FACTOR: (&str, f64, usize) = ("", 1.0, 2);
 
-pub(super) const fn of(figure: SessionFigure) -> Words {
+pub(crate) const fn of(figure: SessionFigure) -> Words {
     use SessionFigure as F;
     match figure {
         F::PressRate => words(

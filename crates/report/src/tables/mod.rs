@@ -6,6 +6,7 @@ mod prediction;
 mod studies;
 mod table;
 mod traces;
+mod twin;
 
 use serde_json::{Map, Value, json};
 use skinrig_analysis::exclusion::Exclusion;
@@ -19,6 +20,7 @@ use crate::input::ReportInput;
 pub(crate) use events::of_events;
 pub(crate) use prediction::of_prediction;
 pub(crate) use table::Table;
+pub(crate) use twin::of_twin;
 
 /// Data for the script: session ID and named tables.
 pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
