@@ -109,6 +109,15 @@ impl Cache {
     }
 }
 
+/// What a request for a variant without results gets, in place of a session without estimates.
+fn no_variant(path: &Path, name: &str) -> Problem {
+    let file = name_of(path);
+    Problem::absent(format!(
+        "{file}: expected results of the analysis `{name}` beside it, made by this version, found none\n  next: `skinrig analyze {file} \
+         --name {name}` with its settings writes them"
+    ))
+}
+
 impl ParsedSession {
     fn read(
         reader: &SessionReader,
@@ -133,6 +142,9 @@ impl ParsedSession {
         };
         let indices = [index(one)?, index(two)?];
         let analysis = lab.analysis(path, &session_id, variant);
+        if let (Some(name), None) = (variant, &analysis) {
+            return Err(no_variant(path, name));
+        }
         let leg_starts = match &analysis {
             Some(_) if legs.len() > 1 => aligned_legs(path)?,
             _ => Vec::new(),

@@ -4,7 +4,7 @@
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 
-use skinrig::library::Program;
+use skinrig::library::{ControlHandle, Program, ProtocolSource, Simulation, simulate};
 use skinrig_view::{Options, Server};
 
 /// Status and whole answer of a request.
@@ -75,4 +75,45 @@ fn only_the_own_page_with_the_token_is_served() {
         assert!((400..500).contains(&status), "{query}: {answer}");
     }
     assert_eq!(get("/api/shelf", &own).0, 200);
+}
+
+#[test]
+fn a_variant_without_results_is_not_found_instead_of_a_session_without_estimates() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulation = Simulation {
+        protocol: ProtocolSource::Text(
+            include_str!("../../../cli/tests/fixtures/small.yaml").to_owned(),
+        ),
+        overrides: Vec::new(),
+        folder: folder.path().to_owned(),
+        level: None,
+        seed: None,
+        command_line: "test".to_owned(),
+    };
+    let session = simulate(simulation, ControlHandle::new()).unwrap();
+    let name = session.file_name().unwrap().to_str().unwrap().to_owned();
+    let options = Options {
+        folder: folder.path().to_owned(),
+        first: None,
+        bind: Options::LOOPBACK,
+        control: false,
+    };
+    let server = Server::open(options, Program).unwrap();
+    let (to, token) = (server.address(), server.token().to_owned());
+    std::thread::spawn(move || server.run_until(std::future::pending()));
+    let own = format!("Host: {to}\r\nAuthorization: Bearer {token}");
+    let get = |query: &str| send_request(to, &format!("GET {query} HTTP/1.1\r\n{own}"), "");
+    for query in [
+        format!("/api/session?session={name}"),
+        format!("/api/download?session={name}&what=presses&format=csv&from_s=0&to_s=1"),
+    ] {
+        let (status, answer) = get(&query);
+        assert_eq!(status, 200, "{query}: {answer}");
+        let (status, answer) = get(&format!("{query}&analysis=nothing"));
+        assert_eq!(status, 404, "{query}: {answer}");
+        assert!(
+            answer.contains("expected results of the analysis `nothing`"),
+            "{answer}"
+        );
+    }
 }
