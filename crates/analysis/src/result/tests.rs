@@ -135,6 +135,13 @@ fn every_violation_has_fields_and_a_text_with_expected_and_found() {
              alignments, found 1.2: the plan may not belong to these recordings at all; check the schedule (presses, \
              sync presses, period) against the recordings, or lower analysis.alignment.min_log_odds",
         ),
+        (
+            json!({"kind": "uncertain_rates", "least_log_odds": 10.0, "log_odds": 1.25, "runner_up_s": [null, null],
+                "period_s": 2.0}),
+            "alignment by event rates: expected log-odds of at least 10 (natural logarithm) against all other \
+             alignments, found 1.2: the plan may not belong to these recordings at all; check the schedule (presses, \
+             sync presses, period) against the recordings, or lower analysis.alignment.min_log_odds",
+        ),
     ];
     for (_, text) in &rows {
         assert!(

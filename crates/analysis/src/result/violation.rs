@@ -236,10 +236,9 @@ fn rounded(limit: f64) -> f64 {
 
 /// The likeliest other alignment.
 fn rival(runner_up_s: Option<&[Option<f64>; 2]>, period_s: f64) -> String {
-    let Some(shifts_s) = runner_up_s else {
-        return "the plan may not belong to these recordings at all".to_owned();
-    };
-    let each = CameraId::ALL.into_iter().zip(shifts_s);
+    let each = CameraId::ALL
+        .into_iter()
+        .zip(runner_up_s.into_iter().flatten());
     let each: Vec<String> = each
         .filter_map(|(camera, shift_s)| {
             let shift_s = (*shift_s)?;
@@ -247,6 +246,9 @@ fn rival(runner_up_s: Option<&[Option<f64>; 2]>, period_s: f64) -> String {
             Some(format!("{camera} {shift_s:+.1} s ({presses:+.1} presses)"))
         })
         .collect();
+    if each.is_empty() {
+        return "the plan may not belong to these recordings at all".to_owned();
+    }
     format!(
         "presses later by {} fit about as well or better",
         each.join(" and ")
