@@ -76,6 +76,7 @@ fn a_twin_predicts_held_out_and_changed_presses_and_is_a_protocol() {
 }
 
 #[test]
+#[ignore = "a minute: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig --test commands twin:: -- --ignored"]
 fn a_session_unlike_its_scene_has_no_twin() {
     let lab = Lab::new();
     // Another model of the skin: its touches come and go otherwise.
