@@ -3,6 +3,7 @@
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
 
 use skinrig::library::{ControlHandle, Program, ProtocolSource, Simulation, simulate};
 use skinrig_view::{Options, Server};
@@ -20,16 +21,21 @@ fn send_request(to: SocketAddr, head: &str, body: &str) -> (u16, String) {
     (status, answer)
 }
 
-#[test]
-fn only_the_own_page_with_the_token_is_served() {
-    let folder = tempfile::tempdir().unwrap();
+/// A server that only reads `folder`.
+fn server_of(folder: &Path) -> Server {
     let options = Options {
-        folder: folder.path().to_owned(),
+        folder: folder.to_owned(),
         first: None,
         bind: Options::LOOPBACK,
         control: false,
     };
-    let server = Server::open(options, Program).unwrap();
+    Server::open(options, Program).unwrap()
+}
+
+#[test]
+fn only_the_own_page_with_the_token_is_served() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = server_of(folder.path());
     let (to, token) = (server.address(), server.token().to_owned());
     assert!(to.ip().is_loopback() && server.link().contains(&format!("#token={token}")));
     std::thread::spawn(move || server.run_until(std::future::pending()));
@@ -92,13 +98,7 @@ fn a_variant_without_results_is_not_found_instead_of_a_session_without_estimates
     };
     let session = simulate(simulation, ControlHandle::new()).unwrap();
     let name = session.file_name().unwrap().to_str().unwrap().to_owned();
-    let options = Options {
-        folder: folder.path().to_owned(),
-        first: None,
-        bind: Options::LOOPBACK,
-        control: false,
-    };
-    let server = Server::open(options, Program).unwrap();
+    let server = server_of(folder.path());
     let (to, token) = (server.address(), server.token().to_owned());
     std::thread::spawn(move || server.run_until(std::future::pending()));
     let own = format!("Host: {to}\r\nAuthorization: Bearer {token}");
