@@ -85,7 +85,7 @@ impl TwinConstant {
         }
     }
 
-    /// Range before a session is seen (assumed: about the published skin, from a perfect skin to one worse than it).
+    /// Range before a session is seen (assumed: about the published skin, from a nearly perfect skin to one worse than it; none without any scatter).
     #[must_use]
     pub const fn range(self) -> (f64, f64) {
         self.prior().0

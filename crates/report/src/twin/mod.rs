@@ -141,7 +141,7 @@ fn sentence(row: &FigureFit) -> String {
         figure_value(row.figure, x)
     });
     format!(
-        "{name} {}, by the other figures {} [{}, {}]",
+        "{name} {}, expected from the other figures {} [{}, {}]",
         value(row.session),
         value(row.expected.middle),
         value(row.expected.low),
@@ -214,7 +214,7 @@ fn places_sentence(places: &PlacePrediction) -> String {
 const FIGURE_HEADS: [&str; 4] = [
     "figure of the calibration presses",
     "session",
-    "by its other figures",
+    "expected from the others",
     "deviations",
 ];
 const CONSTANT_HEADS: [&str; 4] = ["constant", "twin", "assumed before", "explained (%)"];
@@ -303,7 +303,7 @@ fn constant_cells(row: &ConstantFit) -> [String; 4] {
     };
     let (low, high) = row.constant.range();
     let explained = if row.explained < KNOWN {
-        "not told".to_owned()
+        "not shown".to_owned()
     } else {
         number(Some(100.0 * row.explained), 0)
     };

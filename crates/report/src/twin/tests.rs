@@ -134,7 +134,7 @@ fn the_page_holds_tables_figures_and_data() {
         "Errors by place",
         "depth=3mm",
         "scene.skin.press_scatter (mm)",
-        "not told",
+        "not shown",
         "\"predicted_mm\"",
     ] {
         assert!(page.contains(expected), "{expected}");
