@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json as object};
-use skinrig_analysis::result::{Estimate, PressCounts};
+use skinrig_analysis::result::{Analysis, Estimate, PressCounts};
 
 use crate::comparison;
 use crate::input::ReportInput;
@@ -84,10 +84,22 @@ impl Summary {
     }
 }
 
+/// Copy with empty bulk fields: each of their numbers as a JSON value would take most of the time of the document.
+fn without_bulk(analysis: &Analysis) -> Analysis {
+    let mut copy = analysis.clone();
+    copy.rates = Default::default();
+    copy.pictures.clear();
+    copy.zooms.clear();
+    copy.activity.clear();
+    copy.motion = None;
+    copy.alignment.residuals.clear();
+    copy
+}
+
 /// See [`crate::json`].
 pub(crate) fn json(input: &ReportInput<'_>) -> Value {
     // Both are plain data with string keys, so JSON can hold them (NaN becomes null).
-    let mut analysis = serde_json::to_value(input.analysis).unwrap_or(Value::Null);
+    let mut analysis = serde_json::to_value(without_bulk(input.analysis)).unwrap_or(Value::Null);
     if let Some(map) = analysis.as_object_mut() {
         for field in BULK {
             map.remove(field);
