@@ -61,11 +61,6 @@ impl SessionFacts {
     fn has_same_chunks(&self, other: &Self) -> bool {
         mostly_shared(&self.chunks, &other.chunks)
     }
-
-    /// True if a simulation made it. Skins simulated with the same seed are alike; that has a check of its own.
-    pub(crate) fn is_simulated(&self) -> bool {
-        self.origin.as_deref() == Some("simulated")
-    }
 }
 
 impl Session {

@@ -296,9 +296,7 @@ fn check_duplicates(subjects: &[Subject]) -> Option<Difference> {
     for (k, (side, a)) in all().enumerate() {
         for (other, b) in all().skip(k + 1) {
             let same_id = a.facts.session_id == b.facts.session_id;
-            // Two skins may be simulated with the same noise; a further session of one skin may not.
-            let may_repeat = side != other && a.facts.is_simulated();
-            if same_id || (!may_repeat && a.is_same_recording(b)) {
+            if same_id || a.is_same_recording(b) {
                 pairs.push((side != other, same_id));
             }
         }

@@ -165,7 +165,7 @@ fn each_difference_has_its_severity() {
                     skin.sessions[0].facts.origin = Some("simulated".to_owned());
                 }
             },
-            &[],
+            &[("same-session", Blocking)],
         ),
         (
             "a simulation twice on one side",
