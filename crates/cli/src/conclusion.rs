@@ -9,6 +9,7 @@ use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::analysis_request::AnalysisRequest;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::shell_path;
 use crate::results;
 use crate::signals::Operator;
 use crate::sink::SessionSink;
@@ -216,7 +217,7 @@ fn next_step(session: &Path) -> String {
     let header = SessionReader::open(session).and_then(|reader| reader.header());
     match header {
         Ok(header) if header.is_of_a_rig() => {
-            format!("continue with `skinrig resume {}`", session.display())
+            format!("continue with `skinrig resume {}`", shell_path(session))
         }
         _ => "run again".to_owned(),
     }

@@ -111,6 +111,11 @@ pub(crate) fn shell_word(text: &str) -> String {
     }
 }
 
+/// A path as one word of a command that a person pastes into a shell.
+pub(crate) fn shell_path(path: &Path) -> String {
+    shell_word(&path.display().to_string())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,7 +11,7 @@ use skinrig_text::{Blocks, Column, Table, sparkline};
 
 use crate::args::PrototypesArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::{file_name, shell_word};
+use crate::paths::{file_name, shell_path, shell_word};
 use crate::sessions::{copies, originals};
 use crate::shelf::{Shelf, ShelfResult};
 
@@ -127,7 +127,7 @@ fn name_without(entries: &[Entry], folder: &Path) {
         1 + without.count(),
         entries.len(),
         file_name(&first.point.session),
-        shell_word(&folder.display().to_string()),
+        shell_path(folder),
         shell_word(&first.prototype)
     );
 }

@@ -12,6 +12,7 @@ use super::machine::Machine;
 use super::survey::name_of;
 use super::usb;
 use crate::devices::{DeviceState, Line};
+use crate::paths::shell_path;
 use crate::sessions;
 
 const AREA: &str = "bench";
@@ -126,7 +127,7 @@ fn run(case: &Case<'_>) -> Finding {
         None => check.ok("none"),
         Some((session, by)) => check.warning(
             format!("{} is written by {by}", session.display()),
-            format!("skinrig status {}", session.display()),
+            format!("skinrig status {}", shell_path(&session)),
         ),
     }
 }

@@ -11,7 +11,7 @@ use self::files::{LAB, PROTOCOL_SCHEMA, StarterFile};
 use crate::args::{InitArgs, NewArgs};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::shell_word;
+use crate::paths::shell_path;
 
 /// Outcome of writing a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -113,7 +113,7 @@ pub(crate) fn init(args: &InitArgs, json: bool) -> Outcome {
     let enter = if folder == Path::new(".") {
         String::new()
     } else {
-        format!("cd {} && ", shell_word(&folder.display().to_string()))
+        format!("cd {} && ", shell_path(folder))
     };
     outln!("next: {enter}skinrig run protocols/demo.yaml");
     Ok(Exit::Ok)

@@ -21,7 +21,7 @@ use self::headline::{FORMAT, Headline, Number, SelectionEntry, SessionNumbers};
 use crate::args::PublishArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
-use crate::paths::{SESSION_SUFFIX, file_name, stem};
+use crate::paths::{SESSION_SUFFIX, file_name, shell_path, stem};
 use crate::results::{self, write};
 use crate::selection::{self, SelectedPresses, Target, Targets};
 use crate::version::SOFTWARE;
@@ -94,7 +94,7 @@ fn print(args: &PublishArgs, headline: &Headline, json: bool) {
         "numbers   {numbers}, in {}",
         args.out.join(headline::FILE).display()
     );
-    outln!("next      `skinrig reproduce {}`", args.out.display());
+    outln!("next      `skinrig reproduce {}`", shell_path(&args.out));
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {

@@ -8,7 +8,7 @@ use skinrig_protocol::Selection;
 use super::{facts, read};
 use crate::args::{Exclude, SelectArgs};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::folder_of;
+use crate::paths::{folder_of, shell_path};
 use crate::results::write;
 
 /// Writes the selection, and reads it back.
@@ -56,7 +56,7 @@ fn print(args: &SelectArgs, selection: &Selection, json: bool) {
         selection.sessions.len()
     );
     outln!("SHA-256   {}", selection.sha256);
-    outln!("next      `skinrig analyze {}`", args.out.display());
+    outln!("next      `skinrig analyze {}`", shell_path(&args.out));
 }
 
 /// The file's text.

@@ -5,6 +5,7 @@ use skinrig_recorder::{PressTally, SessionTotals};
 use skinrig_text::{LongWords, hang};
 
 use super::state::{LastOutcome, Status, Stored};
+use crate::paths::shell_path;
 use crate::progress::{block_text, time_text};
 use crate::remote::RunSnapshot;
 use crate::rig::gates;
@@ -54,7 +55,7 @@ fn next_step(status: &Status) -> Option<String> {
     }
     Some(match stored.map(|s| s.rig_kind.as_str()) {
         Some("imported" | "replayed") => "import or replay it again".to_owned(),
-        _ => format!("skinrig resume {}", status.session.display()),
+        _ => format!("skinrig resume {}", shell_path(&status.session)),
     })
 }
 
