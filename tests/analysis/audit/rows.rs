@@ -55,10 +55,32 @@ fn positions_in_a_scale_of_no_unit() {
         places: 25,
         ..SessionOptions::default()
     };
-    for factors in [[0.6, 0.6], [0.5, 1.0], [1.7, 1.7]] {
+    for (factors, about_middle) in [
+        ([0.6, 0.6], false),
+        ([0.5, 1.0], false),
+        ([1.7, 1.7], false),
+        ([0.1, 0.1], true),
+        ([0.04, 0.04], true),
+        ([0.1, 0.25], true),
+        ([6.0, 6.0], true),
+    ] {
         names(Fault::UnitOfPositions, |seed| {
             edit(seed, wishes, |input| {
-                let scaled = |p: Point2| Point2::new(factors[0] * p.x_mm, factors[1] * p.y_mm);
+                let n = input.planned.len() as f64;
+                let middle = if about_middle {
+                    let mean = |of: fn(Point2) -> f64| {
+                        input.planned.iter().map(|p| of(p.at)).sum::<f64>() / n
+                    };
+                    Point2::new(mean(|p| p.x_mm), mean(|p| p.y_mm))
+                } else {
+                    Point2::default()
+                };
+                let scaled = |p: Point2| {
+                    Point2::new(
+                        middle.x_mm + factors[0] * (p.x_mm - middle.x_mm),
+                        middle.y_mm + factors[1] * (p.y_mm - middle.y_mm),
+                    )
+                };
                 for (planned, outcome) in input.planned.iter_mut().zip(&mut input.outcomes) {
                     planned.at = scaled(planned.at);
                     let at = outcome.as_mut().unwrap();

@@ -27,7 +27,7 @@ pub(super) const fn of(fault: Fault) -> &'static str {
             "compare the sign of the axis in the position table with the skin frame of the rig description"
         }
         Fault::UnitOfPositions => {
-            "check unit and scale of the position table (csv.unit of the schedule) and of the robot"
+            "check unit and scale of the position table (csv.unit of the schedule) and of the robot, and the camera positions in the rig description"
         }
         Fault::IndexShifted => {
             "compare the first and last rows of the press list with the recording: extra or missing rows, sync presses"

@@ -9,9 +9,10 @@ use skinrig_model::{CameraId, Point2};
 use super::finding::finding;
 use super::fixed_pixel;
 use super::observed_press::ObservedPress;
-use super::readings::{MIN_SPREAD_DEG, Path, Reading, ScoredReading};
+use super::readings::{MIN_SPREAD_DEG, Path, Reading, ScoredReading, scatter_deg};
 use super::rearranged::rearranged_rows;
 use super::resection::{residuals, spread_deg};
+use super::scale::stretched;
 use super::segments::{ShiftedSegment, locally_shifted_segment, shifted_segment};
 use super::statistics::median;
 use crate::result::{Analysis, Evidence, Fault, Finding, Law};
@@ -54,6 +55,8 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     if as_is.fits == [None; 2] {
         return Vec::new();
     }
+    // A smaller scale makes the residuals of any wrong list smaller: these readings come after all others.
+    let stretched = || stretched(&path, &as_is, as_is.follows(FOLLOWS));
     let mut readings = path.alternatives();
     readings.extend(path.displaced(&as_is));
     readings.push(path.as_planned());
@@ -61,7 +64,7 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     if let Some((fault, best)) = likelier(&path, &as_is, &readings) {
         // Cameras on one side of the skin see another scale much as another origin.
         let stretched = match fault {
-            Fault::PositionsDisplaced => path.stretched(),
+            Fault::PositionsDisplaced => stretched(),
             _ => Vec::new(),
         };
         let (fault, best) = likelier(&path, &best, &stretched).unwrap_or((fault, best));
@@ -76,7 +79,7 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     if let Some(finding) = rearranged(&path, &as_is) {
         return vec![finding];
     }
-    if let Some((fault, best)) = likelier(&path, &as_is, &path.stretched()) {
+    if let Some((fault, best)) = likelier(&path, &as_is, &stretched()) {
         return vec![other_reading(&path, &as_is, &best, fault)];
     }
     let lost: Vec<CameraId> = CameraId::ALL
@@ -95,7 +98,7 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     }
     CameraId::ALL
         .into_iter()
-        .filter_map(|camera| far_off(&as_is, camera))
+        .filter_map(|camera| far_off(analysis, &path, &as_is, camera))
         .collect()
 }
 
@@ -224,8 +227,8 @@ fn does_not_follow(
     let Some(fit) = as_is.fits[k] else {
         return false;
     };
-    // If most presses share one angle, for instance at a single location, columns cannot follow it.
-    if as_is.ignorance_deg[k] < MIN_SPREAD_DEG {
+    // If most presses share one angle, for instance at a single location, columns cannot follow it. But neither can they move.
+    if as_is.ignorance_deg[k].max(fit.spread_deg) < MIN_SPREAD_DEG {
         return false;
     }
     let limit = FOLLOWS_NOT * as_is.ignorance_deg[k];
@@ -234,6 +237,27 @@ fn does_not_follow(
         &columns(path, as_is.reading, k),
     ));
     fit.spread_deg > limit && calibrated.is_none_or(|spread| spread > limit)
+}
+
+/// Difference of a calibrated camera whose columns follow the positions from the nominal one: x and y, mm, and skew, degrees.
+fn calibrated_off(
+    analysis: &Analysis,
+    path: &Path<'_>,
+    as_is: &ScoredReading<'_>,
+    k: usize,
+) -> Option<[f64; 3]> {
+    let (nominal, calibrated) = (
+        &analysis.rig.nominal.cameras[k],
+        &analysis.geometry.cameras[k],
+    );
+    let pairs = columns(path, as_is.reading, k);
+    let spread = spread_deg(&residuals(calibrated, &pairs))?;
+    let follows = spread < FOLLOWS * scatter_deg(calibrated, &pairs);
+    follows.then_some([
+        calibrated.position.x_mm - nominal.position.x_mm,
+        calibrated.position.y_mm - nominal.position.y_mm,
+        calibrated.skew_deg - nominal.skew_deg,
+    ])
 }
 
 fn columns(path: &Path<'_>, reading: &Reading, k: usize) -> Vec<(f64, Point2)> {
@@ -297,13 +321,19 @@ fn covers_the_list(analysis: &Analysis, path: &Path<'_>) -> bool {
 }
 
 /// A camera far from its nominal position; the calibration compensates for it.
-fn far_off(as_is: &ScoredReading<'_>, camera: CameraId) -> Option<Finding> {
+fn far_off(
+    analysis: &Analysis,
+    path: &Path<'_>,
+    as_is: &ScoredReading<'_>,
+    camera: CameraId,
+) -> Option<Finding> {
     let k = camera.index();
     let fit = as_is.fits[k]?;
-    if fit.spread_deg >= FOLLOWS * as_is.ignorance_deg[k] {
-        return None;
-    }
-    let [x, y, skew, ..] = fit.off;
+    let [x, y, skew] = if fit.spread_deg < FOLLOWS * as_is.ignorance_deg[k] {
+        [fit.off[0], fit.off[1], fit.off[2]]
+    } else {
+        calibrated_off(analysis, path, as_is, k)?
+    };
     let far = libm::hypot(x, y) > FAR_MM || skew.abs() > FAR_DEG;
     far.then(|| {
         let evidence = Evidence::CameraFar {

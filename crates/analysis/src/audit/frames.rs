@@ -7,9 +7,6 @@ use crate::result::{Corner, Fault, FrameChange, Origin, Turn};
 /// Factors between common units of length: m and cm for mm, inches, and the reverse.
 const FACTORS: [f64; 6] = [1e-3, 0.1, 1.0 / 25.4, 1e3, 10.0, 25.4];
 
-/// Other factors that a table may be wrong by, along both axes or one: a pitch that was typed wrong, a ruler read in another scale.
-const STRETCHES: [f64; 6] = [0.5, 0.625, 0.8, 1.25, 1.6, 2.0];
-
 /// A transform from positions of the table to the skin frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Frame {
@@ -46,18 +43,18 @@ impl Frame {
         }
     }
 
-    /// Tables stretched about 0 along both axes or one.
-    pub(super) fn stretched() -> impl Iterator<Item = Self> {
-        let factors = STRETCHES.into_iter();
-        factors
-            .flat_map(|f| [[f, f], [f, 1.0], [1.0, f]])
-            .map(|[x, y]| Self {
-                fault: Fault::UnitOfPositions,
-                change: FrameChange::Stretched { factors: [x, y] },
-                matrix: [[x, 0.0], [0.0, y]],
-                about: Point2::default(),
-                by: [0.0; 2],
-            })
+    /// A table to be multiplied by these factors along x and y about a point.
+    pub(super) fn stretched([x, y]: [f64; 2], about: Origin, point: Point2) -> Self {
+        Self {
+            fault: Fault::UnitOfPositions,
+            change: FrameChange::Stretched {
+                factors: [x, y],
+                about,
+            },
+            matrix: [[x, 0.0], [0.0, y]],
+            about: point,
+            by: [0.0; 2],
+        }
     }
 
     /// All known transforms, about 0 and about the middle of the skin.

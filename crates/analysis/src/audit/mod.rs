@@ -27,6 +27,7 @@ mod rearranged;
 mod recording_gaps;
 mod repetitions;
 mod resection;
+mod scale;
 mod segments;
 mod statistics;
 mod whole_presses;

@@ -1,11 +1,18 @@
 //! Decides which findings follow from others, and which comes first.
 
-use crate::result::{Evidence, Fault, Finding, Law};
+use crate::result::{Evidence, Fault, Finding, FrameChange, Law, OtherReading};
 
 /// Drops findings that follow from a more certain one, which invalidates if any of them does; the most certain comes first.
 pub(crate) fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
     found.sort_by_key(|f| (place(f), !f.invalidates));
     let mut reported: Vec<Finding> = Vec::new();
+    // A scale has parameters enough to fit some of a move, but makes no repetitions disagree.
+    if let Some(moved) = found.iter().position(|f| f.fault == Fault::RigMoved)
+        && found.iter().any(is_stretch)
+    {
+        found[moved].invalidates = true;
+        found.retain(|f| !is_stretch(f));
+    }
     for finding in found {
         let repeats = |k: &Finding| k.fault == finding.fault && k.camera == finding.camera;
         match reported
@@ -52,6 +59,19 @@ fn place(finding: &Finding) -> u8 {
         Fault::NoTriggers => 25,
         Fault::Unknown => 26,
     }
+}
+
+/// True if only another scale of the positions explains the columns.
+fn is_stretch(finding: &Finding) -> bool {
+    matches!(
+        finding.evidence,
+        Evidence::OtherReading {
+            reading: OtherReading::Frame {
+                frame: FrameChange::Stretched { .. }
+            },
+            ..
+        }
+    )
 }
 
 /// True if the bursts of one camera come at the times of other presses.

@@ -6,11 +6,11 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_model::{CameraId, Point2, PressRole, RigGeometry, SENSOR_WIDTH};
+use skinrig_model::{CameraId, CameraModel, Point2, PressRole, RigGeometry, SENSOR_WIDTH};
 
 use super::frames::Frame;
 use super::observed_press::ObservedPress;
-use super::resection::{Resection, resect, residual_deg};
+use super::resection::{MEDIAN_TO_SIGMA, Resection, resect, residual_deg};
 use super::statistics::median;
 use crate::result::{Fault, OtherReading};
 
@@ -22,8 +22,6 @@ pub(super) const MIN_SPREAD_DEG: f64 = 5.0;
 pub(crate) const MAX_SHIFT: i32 = 5;
 /// Cost of a fitted displacement, nats: two free parameters anywhere on the skin.
 const FREE_DISPLACEMENT: f64 = 4.0;
-/// Cost of a stretch, nats: one of eighteen (2.9), and rarer than a wrong unit.
-const FREE_STRETCH: f64 = 4.0;
 /// Cost of a shift of each stream, nats: one of eleven each.
 const FREE_SHIFTS: f64 = 4.8;
 /// Maximum evidence of the sync presses against a reading, nats per camera: they share one location, which may be poorly
@@ -48,7 +46,7 @@ pub(super) struct Reading {
     /// Rows by which each stream is late: its columns are those of the presses so many rows later.
     pub rows: [i32; 2],
     /// Added to the cost, nats.
-    penalty: f64,
+    pub penalty: f64,
 }
 
 /// A reading with its best fit.
@@ -190,13 +188,13 @@ impl<'a> Path<'a> {
         all
     }
 
-    /// Positions in another scale. A smaller one makes the residuals of any wrong list smaller: these readings come after all others.
-    pub(super) fn stretched(&self) -> Vec<Reading> {
-        let readings = Frame::stretched().map(|frame| Reading {
-            penalty: FREE_STRETCH,
-            ..self.in_frame(&frame)
-        });
-        readings.collect()
+    /// The same path, of which only about `presses` are compared.
+    pub(super) fn thinned(&self, presses: usize) -> Self {
+        Self {
+            presses_seen: self.presses_seen.clone(),
+            stride: self.presses_seen.len().div_ceil(presses).max(1),
+            ..*self
+        }
     }
 
     /// The positions of a table given in `frame`.
@@ -358,13 +356,7 @@ impl<'a> Path<'a> {
             let Some(fit) = resect(drawn, &pairs, self.places) else {
                 continue;
             };
-            let angles: Vec<f64> = pairs
-                .iter()
-                .map(|p| drawn.angle_of_point_deg(p.1))
-                .collect();
-            let middle = median(angles.clone()).unwrap_or(0.0);
-            let scatter = median(angles.iter().map(|a| (a - middle).abs()).collect());
-            judged.ignorance_deg[k] = 1.4826 * scatter.unwrap_or(0.0);
+            judged.ignorance_deg[k] = scatter_deg(drawn, &pairs);
             judged.cost += fit.cost;
             if let Some((column, at)) = self.sync[k] {
                 let column = mirrored(column, reading.mirrored[k]);
@@ -416,6 +408,15 @@ impl<'a> Path<'a> {
             })
             .collect()
     }
+}
+
+/// Robust standard deviation of the viewing angles of the positions about their median, degrees; 0 of none.
+pub(super) fn scatter_deg(camera: &CameraModel, pairs: &[(f64, Point2)]) -> f64 {
+    let angles = pairs.iter().map(|p| camera.angle_of_point_deg(p.1));
+    let angles: Vec<f64> = angles.collect();
+    let middle = median(angles.clone()).unwrap_or(0.0);
+    let scatter = median(angles.iter().map(|a| (a - middle).abs()).collect());
+    MEDIAN_TO_SIGMA * scatter.unwrap_or(0.0)
 }
 
 fn mirrored(column: f64, yes: bool) -> f64 {

@@ -20,7 +20,7 @@ const MAX_PLACES: f64 = 25.0;
 /// Lower bound of the angle uncertainty, degrees: half a degree is 5 columns.
 pub(super) const MIN_SPREAD_DEG: f64 = 0.5;
 /// Standard deviation of a normal distribution divided by its median absolute value.
-const MEDIAN_TO_SIGMA: f64 = 1.4826;
+pub(super) const MEDIAN_TO_SIGMA: f64 = 1.4826;
 /// Residuals of this many standard deviations have half weight.
 const SOFT: f64 = 2.5;
 /// Iterations of the fit.

@@ -270,8 +270,8 @@ fn every_other_reading_has_fields_and_a_text() {
             "all multiplied by 25.400",
         ),
         (
-            json!({"kind": "stretched", "factors": [2.0, 1.0]}),
-            "x multiplied by 2.00 and y by 1.00",
+            json!({"kind": "stretched", "factors": [2.0, 1.0], "about": "table"}),
+            "x multiplied by 2.00 and y by 1.00 about the middle of the table",
         ),
         (
             json!({"kind": "other_origin", "origin": "lower_left", "is_added": false}),

@@ -86,7 +86,7 @@ use crate::rule::Rule;
 /// errors of its own. Version 19: a place that a plan lists again is one location. Version
 /// 20: a look needs half of the presses, and an open question is a warning. Version 24: the window of a long hold ends 1 s after the depth was
 /// reached.
-pub const ANALYSIS_VERSION: u32 = 28;
+pub const ANALYSIS_VERSION: u32 = 29;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

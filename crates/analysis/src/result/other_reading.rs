@@ -24,10 +24,13 @@ pub enum FrameChange {
         factor: f64,
     },
     /// Stretched.
-    #[error("x multiplied by {:.2} and y by {:.2}", .factors[0], .factors[1])]
+    #[error("x multiplied by {:.2} and y by {:.2} about {about}", .factors[0], .factors[1])]
     Stretched {
         /// Factors from the table to the skin frame, along x and y.
         factors: [f64; 2],
+        /// Fixed point.
+        #[serde(default = "Origin::zero")]
+        about: Origin,
     },
     /// Relative to another point of the skin.
     #[error("the skin's {origin} {}", if *.is_added { "added" } else { "subtracted" })]
@@ -79,7 +82,7 @@ impl fmt::Display for Turn {
     }
 }
 
-/// Fixed point of a [`Turn`].
+/// Fixed point of a change of the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
@@ -87,6 +90,15 @@ pub enum Origin {
     Zero,
     /// Centre of the skin.
     Centre,
+    /// Mean of the table's positions.
+    Table,
+}
+
+impl Origin {
+    /// Fixed point of a stretch whose results do not name one.
+    const fn zero() -> Self {
+        Self::Zero
+    }
 }
 
 impl fmt::Display for Origin {
@@ -94,6 +106,7 @@ impl fmt::Display for Origin {
         f.write_str(match self {
             Self::Zero => "0",
             Self::Centre => "the skin's centre",
+            Self::Table => "the middle of the table",
         })
     }
 }
