@@ -17,3 +17,4 @@ mod relations;
 mod sample;
 mod session;
 mod timebase;
+mod unused;

@@ -8,6 +8,7 @@ use crate::result::{
     Analysis, Estimate, PressResult, PressView, Reduction, ReductionRow, Warning, WarningCause,
 };
 use crate::storms::storms;
+use crate::unused_settings::unused_settings;
 
 /// A thinned row is comparable if it locates at least this share of what all events locate.
 const COMPARABLE: f64 = 0.95;
@@ -39,6 +40,7 @@ pub(crate) fn caveats(analysis: &Analysis) -> Vec<Warning> {
         .chain(storms)
         .chain(repeated_positions(&measured))
         .chain(unknown)
+        .chain(unused_settings(&analysis.settings))
         .collect()
 }
 

@@ -72,6 +72,7 @@ pub mod timebase;
 pub mod tradeoff;
 pub mod triangulate;
 mod untimed;
+mod unused_settings;
 pub mod verdict;
 mod width;
 mod with_text;

@@ -263,6 +263,10 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
              clusters it does not",
         ),
         (
+            json!({"kind": "unused_setting", "key": "analysis.forget", "because": "analysis.estimator=dbscan"}),
+            "analysis.forget changes no estimate: analysis.estimator=dbscan does not use it",
+        ),
+        (
             json!({"kind": "no_scored_press"}),
             "no scored press was attempted, so there are no metrics",
         ),

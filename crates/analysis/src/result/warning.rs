@@ -74,6 +74,7 @@ impl WarningCause {
                 | Self::UndecidedLooks { .. }
                 | Self::WindowsOverlap
                 | Self::UnsuitableSettings { .. }
+                | Self::UnusedSetting { .. }
                 | Self::RepeatedPositions { .. }
                 | Self::LeftOutUnknown { .. }
                 | Self::LocatorUnfit { .. }
@@ -263,6 +264,14 @@ pub enum WarningCause {
     UnsuitableSettings {
         /// The first of its findings.
         fault: Fault,
+    },
+    /// A setting that another makes useless.
+    #[error("{key} changes no estimate: {because} does not use it")]
+    UnusedSetting {
+        /// The setting.
+        key: String,
+        /// The other one, and its value.
+        because: String,
     },
     /// No metrics.
     #[error("no scored press was attempted, so there are no metrics")]

@@ -86,9 +86,9 @@ pub fn reduction(input: &ReportInput<'_>) -> Option<Figure> {
 
 fn caption(study: &Reduction) -> String {
     let mut caption = format!(
-        "Data reduction: localisation when only one event in k is kept, with one clustering setting at all factors \
-         (radius {} px, core threshold {} events). Values are over {} seeds, bands 95 % intervals over locations \
-         (exact where a share is 0 or 100 %), {} presses. A press without an estimate fails in B, C and D; presses \
+        "Data reduction: localisation when only one event in k is kept, by DBSCAN with one setting at all \
+         factors (radius {} px, core threshold {} events), whatever the estimator of the analysis. Values are over {} \
+         seeds, bands 95 % intervals over locations (exact where a share is 0 or 100 %), {} presses. A press without an estimate fails in B, C and D; presses \
          that the results leave out for too few events take part, as at high factors nothing would be left. \
          The pass threshold is the 95th percentile of the errors at factor 1 ({} mm), so B begins at about 95 % by \
          construction; C requires an error of at most {} mm. Small figures above the plots: kB/s of both cameras \

@@ -1,6 +1,7 @@
 //! Owns the tables that compare the session with published skins, and with the public code's evaluation.
 
 use skinrig_analysis::result::{Analysis, Thinning};
+use skinrig_model::Estimator;
 
 use crate::comparison::{Cell, rows};
 use crate::document::Table;
@@ -135,13 +136,25 @@ pub(super) fn skins(input: &ReportInput<'_>) -> Table {
             "single".to_owned(),
             NONE.to_owned(),
             own(input),
-            "stereo, DBSCAN".to_owned(),
+            own_method(input),
         ],
         true,
     );
     grid.note("All rows but the last are published values collected by the paper. Areas, loads and evaluation methods differ: not a ranking.");
     grid.fold();
     grid
+}
+
+/// How the session's columns and positions were found.
+fn own_method(input: &ReportInput<'_>) -> String {
+    let settings = &input.analysis.settings;
+    let estimator = match settings.estimator {
+        Estimator::Dbscan => "DBSCAN",
+        Estimator::ColumnMedian => "median column",
+        Estimator::HistogramPeak => "peak of the columns",
+        Estimator::Streaming => "running histogram",
+    };
+    format!("stereo, {estimator}")
 }
 
 /// The paper's overview of optical tactile sensors, with the session as its last row.
@@ -170,7 +183,7 @@ pub(super) fn sensors(input: &ReportInput<'_>) -> Table {
             "here".to_owned(),
             "2 event cameras".to_owned(),
             "location".to_owned(),
-            "stereo, DBSCAN".to_owned(),
+            own_method(input),
             format!("{}{width}", own(input)),
         ],
         true,
