@@ -8,6 +8,7 @@ use crate::comparability::{Difference, Severity, differences};
 use crate::location_results::{Location, compare_locations};
 use crate::locations::Locations;
 use crate::metrics::Metric;
+use crate::no_result::NoResult;
 use crate::sequential::{SequentialComparison, first_repetitions, look};
 use crate::subject::{SessionFacts, Subject};
 use crate::table::{Margins, Row, table};
@@ -171,6 +172,20 @@ pub fn compare(
         return result;
     }
     result.table = table(subjects, &locations, within_mm, &options.margins, &settings);
+    if result
+        .sequential
+        .as_ref()
+        .is_some_and(SequentialComparison::awaits_sessions)
+    {
+        // No press was looked at.
+        for row in &mut result.table {
+            let missing = row.values.iter_mut().map(|v| &mut v.missing);
+            let errors = row.against_first.iter_mut().map(|c| &mut c.error);
+            missing
+                .chain(errors)
+                .for_each(|reason| *reason = Some(NoResult::OneSession));
+        }
+    }
     // Marks on the map are at the ordinary level.
     let ordinary = Settings {
         pairing: settings.pairing,

@@ -21,7 +21,8 @@ pub struct Look {
     pub repetitions: u32,
     /// Presses of A and B that count.
     pub presses: [u32; 2],
-    /// Alpha spent at this look: the interval has the level 1 - alpha.
+    /// Alpha spent at this look: the interval has the level 1 - alpha. 0 for a look that the sessions do not allow yet; its
+    /// share passes to the first that they do.
     pub alpha: f64,
     /// Alpha spent up to this look.
     pub spent: f64,
@@ -51,6 +52,12 @@ pub struct SequentialComparison {
 }
 
 impl SequentialComparison {
+    /// True if each look so far was at one session of a skin that has several.
+    pub(crate) fn awaits_sessions(&self) -> bool {
+        let refused = |look: &Look| look.refused == Some(NoResult::OneSession);
+        !self.looks.is_empty() && self.looks.iter().all(refused)
+    }
+
     /// The look that decided.
     #[must_use]
     pub fn decision(&self) -> Option<&Look> {
@@ -75,29 +82,32 @@ pub(crate) fn look(
     };
     let last = complete[0].min(complete[1]);
     let mut looks = Vec::new();
-    let (mut outlook, mut spent) = (Outlook::Unknown, 0.0);
+    let (mut outlook, mut spent, mut passed_on) = (Outlook::Unknown, 0.0, 0.0);
     let mut used = (
         first_repetitions(subjects, 0),
         spending.settings(settings, 1).unwrap_or(*settings),
     );
     for number in 1..=last {
-        let Some(own) = spending.settings(settings, number) else {
+        let Some(mut own) = spending.settings(settings, number) else {
             outlook = Outlook::Spent;
             break;
         };
-        spent += own.alpha;
+        own.alpha += passed_on;
         if repetitions.iter().any(|r| !r.shows_sessions(number)) {
             looks.push(Look {
                 repetitions: number,
                 presses: [0; 2],
-                alpha: own.alpha,
+                alpha: 0.0,
                 spent,
                 difference_mm: None,
                 verdict: None,
                 refused: Some(NoResult::OneSession),
             });
+            passed_on = own.alpha;
             continue;
         }
+        spent += own.alpha;
+        passed_on = 0.0;
         let chosen = first_repetitions(subjects, number);
         let locations = Locations::of(&chosen);
         let samples = chosen.each_ref().map(|s| {

@@ -27,7 +27,7 @@ pub use self::figures::{
 };
 
 /// Fewest skins from which a twin is fitted.
-pub const LEAST_SKINS: usize = 40;
+const LEAST_SKINS: usize = 40;
 /// A figure of the session is used if at least this share of the skins has it.
 const LEAST_SHARE: f64 = 0.9;
 /// A figure is named as unlike beyond this many standard deviations of what the other figures make of it.

@@ -112,6 +112,19 @@ fn looks_begin_with_the_second_session() {
     assert_eq!(taken.first(), Some(&3), "{looks:#?}");
     assert_eq!(looks[0].refused, Some(NoResult::OneSession));
     assert_eq!(looks[0].verdict, None);
+    // What the first two did not spend is spent by the third.
+    let spent = |look: &skinrig_compare::Look| [look.alpha, look.spent];
+    assert_eq!(spent(&looks[1]), [0.0; 2]);
+    let three_looks = 0.05 * (1.0 / 2.0 + 1.0 / 6.0 + 1.0 / 12.0);
+    assert!((looks[2].alpha - three_looks).abs() < 1e-12, "{looks:#?}");
+    assert!((looks[2].spent - three_looks).abs() < 1e-12, "{looks:#?}");
+    let found = compare(
+        &[skin('A', &[&one]), skin('B', &[&three, &four])],
+        &vec![None],
+        &options,
+    );
+    let reason = &found.table[0].against_first[0].error;
+    assert_eq!(*reason, Some(NoResult::OneSession));
     let (taken, looks) = looked(&[&one], &[&three, &four]);
     assert_eq!(taken, [0; 0], "{looks:#?}");
     let (taken, looks) = looked(&[&one], &[&three]);

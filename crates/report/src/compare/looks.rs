@@ -75,7 +75,7 @@ pub(super) fn table(of: &SequentialComparison, letter: char) -> Table {
         Row::new([
             format!("repetition {}", look.repetitions),
             format!("{} + {}", look.presses[0], look.presses[1]),
-            number(Some(100.0 * (1.0 - look.alpha)), 2),
+            number((look.alpha > 0.0).then_some(100.0 * (1.0 - look.alpha)), 2),
             number(Some(100.0 * look.spent), 2),
             difference,
         ])
