@@ -12,7 +12,8 @@ pub enum TrainingError {
     NoClock(CameraId),
     /// Too few presses.
     #[error(
-        "expected at least {least} valid calibration presses with an idle time after them, found {found}"
+        "expected at least {least} valid calibration presses that another one follows (idle time beside scored presses teaches \
+         nothing), found {found}; where roles alternate from press to press there are none"
     )]
     FewPresses {
         /// Number found.

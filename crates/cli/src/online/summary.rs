@@ -118,8 +118,11 @@ impl Felts {
             let own = |s: &&Sighting| s.onset_us == onset.host_us;
             Some(sightings.iter().filter(own).copied().collect::<Vec<_>>())
         };
+        // A touch that begins again during a press that came while a false alarm lasted was not felt.
+        let is_felt = |p: &&ScoredPress| score.delays_ms.iter().any(|(row, _)| *row == p.row);
         let seen: Vec<(usize, Vec<Sighting>)> = presses
             .iter()
+            .filter(is_felt)
             .filter_map(|p| Some((p.row, of_press(p)?)))
             .collect();
         let first = |s: &[Sighting]| s.iter().find(|s| is_met(stop, s)).copied();
