@@ -13,7 +13,7 @@ use skinrig_report::{Summary, Variant};
 
 use crate::analysis_request::AnalysisRequest;
 use crate::exit::Failure;
-use crate::paths::{beside, folder_of, stem};
+use crate::paths::{beside, folder_of, shell_path, stem};
 use crate::selection::SelectedPresses;
 
 pub(crate) use self::stored::{stored, stored_of};
@@ -184,19 +184,19 @@ pub(crate) fn variant(session: &Path, session_id: &str, name: &str) -> Result<Va
         && results_path(session, Some(name)).exists()
     {
         return Err(Failure::input(format!(
-            "{0}: expected an analysis named `{name}` of this session, found one that cannot be used: {why}\n  next: `skinrig show {0}` \
-             lists what it changes; `skinrig analyze {0} --set KEY=VALUE --name {name}` makes it again",
-            session.display()
+            "{0}: expected an analysis named `{name}` of this session, found one that cannot be used: {why}\n  next: `skinrig show {on}` \
+             lists what it changes; `skinrig analyze {on} --set KEY=VALUE --name {name}` makes it again",
+            session.display(),
+            on = shell_path(session)
         )));
     }
     found.ok().flatten().ok_or_else(|| {
         let others: Vec<String> = all(session, session_id).into_iter().filter_map(|a| a.name).collect();
         let there = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
         Failure::input(format!(
-            "{0}: expected an analysis named `{name}`, found {there}\n  next: `skinrig analyze {0} --set KEY=VALUE --name {name}` \
-             creates it, `skinrig show {0}` lists all",
-            session.display()
-        ))
+            "{0}: expected an analysis named `{name}`, found {there}\n  next: `skinrig analyze {on} --set KEY=VALUE --name {name}` \
+             creates it, `skinrig show {on}` lists all",
+            session.display(), on = shell_path(session)))
     })
 }
 

@@ -125,14 +125,16 @@ pub(crate) fn end_of(session: &Path, report: &RunReport) -> Result<Option<String
         RunEnd::Completed => match presses_lost_to_the_rig(session)? {
             Some(lost) => Err(Failure::rig(format!(
                 "{lost}\n  the session is kept: {}\n  next: fix the cause that they name (device, cable, disk), then repeat these presses \
-            with `skinrig resume {0}`",
-                session.display()
+            with `skinrig resume {on}`",
+                session.display(),
+                on = shell_path(session)
             ))),
             None => match device_problem(session, report)? {
                 Some(problem) => Err(Failure::rig(format!(
                     "{problem}\n  all presses of the plan are done, and the session is kept: {}\n  next: check that device before \
-                     the next run; `skinrig show {0}` lists what was kept",
-                    session.display()
+                     the next run; `skinrig show {on}` lists what was kept",
+                    session.display(),
+                    on = shell_path(session)
                 ))),
                 None => Ok(None),
             },
@@ -176,8 +178,9 @@ fn presses_lost_to_the_rig(session: &Path) -> Result<Option<String>, Failure> {
     let plan: Plan = serde_json::from_str(&header.plan_json).map_err(|e| {
         Failure::rig(format!(
             "{0}: expected the plan that was just executed, found: {e}
-  next: `skinrig verify {0}`",
-            session.display()
+  next: `skinrig verify {on}`",
+            session.display(),
+            on = shell_path(session)
         ))
     })?;
     let pending = plan.pending(&histories);

@@ -8,6 +8,7 @@ use skinrig_recorder::{SessionReader, writer_of};
 use crate::args::{ControlArgs, NoteArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::host::user_name;
+use crate::paths::shell_path;
 use crate::remote::{RemoteError, Reply, Request, RunRequest, RunSnapshot, ask};
 use crate::sessions;
 
@@ -78,8 +79,9 @@ fn ended(what: RunRequest, session: &Path, json: bool) -> Outcome {
         RunRequest::Stop | RunRequest::Abort | RunRequest::Halt
     ) {
         return Err(Failure::input(format!(
-            "{}: the run has already ended\n  next: `skinrig status {0}` shows how",
-            session.display()
+            "{}: the run has already ended\n  next: `skinrig status {on}` shows how",
+            session.display(),
+            on = shell_path(session)
         )));
     }
     if json {

@@ -12,7 +12,7 @@ use skinrig_recorder::{SessionReader, copy_session, tags_path};
 use crate::analysis_request::AnalysisRequest;
 use crate::args::{ExportArgs, ExportKind, ExportTable};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::{SESSION_SUFFIX, beside, file_name, stem};
+use crate::paths::{SESSION_SUFFIX, beside, file_name, shell_path, stem};
 use crate::results::{self, Results};
 use crate::selection::{self, Target};
 use crate::signature;
@@ -193,11 +193,10 @@ fn files(
 pub fn invalid(session: &Path, analysis: &Analysis) -> Option<Failure> {
     (!analysis.is_valid()).then(|| {
         Failure::limit(format!(
-            "{0}: INVALID, do not use the exported numbers (`valid` is false in the results): {1}\n  next: `skinrig analyze {0}` says \
+            "{0}: INVALID, do not use the exported numbers (`valid` is false in the results): {1}\n  next: `skinrig analyze {on}` says \
              what to mend",
             session.display(),
-            analysis.invalid_because().join("; ")
-        ))
+            analysis.invalid_because().join("; "), on = shell_path(session)))
     })
 }
 

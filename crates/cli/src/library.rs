@@ -13,6 +13,7 @@ pub use skinrig_controller::ControlHandle;
 use crate::analysis_request::AnalysisRequest;
 use crate::args::{CompareArgs, RunArgs};
 use crate::exit::Failure;
+use crate::paths::shell_path;
 use crate::results;
 use crate::signals::Operator;
 use crate::terminal::Output;
@@ -61,9 +62,8 @@ pub fn stored_results(
     } else {
         analyses::summary(session, session_id, None).map_err(|e| {
             Failure::input(format!(
-                "{0}: expected results beside it, found none that can be used: {e}\n  next: `skinrig analyze {0}` writes them",
-                session.display()
-            ))
+                "{0}: expected results beside it, found none that can be used: {e}\n  next: `skinrig analyze {on}` writes them",
+                session.display(), on = shell_path(session)))
         })?;
     }
     std::fs::read_to_string(&path)

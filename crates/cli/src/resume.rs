@@ -25,7 +25,7 @@ use crate::hil::lease;
 use crate::host::host_name;
 use crate::looks::LookMode;
 use crate::notify::{self, RunMessages};
-use crate::paths;
+use crate::paths::{self, shell_path};
 use crate::progress::ProgressView;
 use crate::rig::tolerated::ToleratedMismatches;
 use crate::rig::{self, bench, gates, planted};
@@ -101,14 +101,13 @@ fn refusal(error: RecorderError) -> Failure {
                 "{name}: expected a sound session to continue, found {} problem(s)",
                 problems.len() as u64 + more_problems
             );
-            for problem in &problems {
-                words += &format!("\n  {problem}");
-            }
+            words.extend(problems.iter().map(|problem| format!("\n  {problem}")));
             if more_problems > 0 {
                 words += &format!("\n  and {more_problems} more");
             }
             words += &format!(
-                "\n  nothing was changed\n  next: `skinrig salvage {name}` copies the intact part into a new session"
+                "\n  nothing was changed\n  next: `skinrig salvage {}` copies the intact part into a new session",
+                shell_path(&path)
             );
             Failure::limit(words)
         }
@@ -123,8 +122,9 @@ fn nothing_left(session: &Path, end: &RunEnd) -> String {
         Some(reason) => format!("{}: {reason}", end.name()),
     };
     format!(
-        "{0}: expected presses left to make, found none; the run ended {reason}\n  next: resolve that, then `skinrig analyze {0}`",
-        session.display()
+        "{0}: expected presses left to make, found none; the run ended {reason}\n  next: resolve that, then `skinrig analyze {on}`",
+        session.display(),
+        on = shell_path(session)
     )
 }
 
@@ -402,16 +402,14 @@ fn open_rig(
             bench: None,
         });
     }
-    let path = match (&args.rig, found.document.rig["file_name"].as_str()) {
-        (Some(file), _) => file.clone(),
-        (None, Some(file)) => file.into(),
-        (None, None) => {
-            return Err(Failure::input(format!(
-                "{}: expected the rig file of the session with --rig, found none",
-                args.session.display()
-            )));
-        }
-    };
+    let recorded = found.document.rig["file_name"].as_str();
+    let path = args.rig.clone().or(recorded.map(PathBuf::from));
+    let path = path.ok_or_else(|| {
+        Failure::input(format!(
+            "{}: expected the rig file of the session with --rig, found none",
+            args.session.display()
+        ))
+    })?;
     let mut file = bench::load(&path)?;
     if args.tolerant {
         bench::tolerate(&mut file);
@@ -557,8 +555,9 @@ fn only_seal(session: &Path) -> Outcome {
         .finish_with_notice(notify)
         .map_err(Failure::internal)?;
     outln!(
-        "{}: ended; only its seal was missing, and has been added\n  next: skinrig analyze {0}",
-        session.display()
+        "{}: ended; only its seal was missing, and has been added\n  next: skinrig analyze {on}",
+        session.display(),
+        on = shell_path(session)
     );
     Ok(Exit::Ok)
 }

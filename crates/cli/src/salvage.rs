@@ -5,7 +5,7 @@ use skinrig_text::{Column, Table};
 
 use crate::args::SalvageArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::beside;
+use crate::paths::{beside, shell_path};
 
 /// Copies the intact part of a damaged session into a new one, and lists what was lost.
 ///
@@ -29,11 +29,12 @@ pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
     if report.is_whole() {
         return Ok(Exit::Ok);
     }
-    let (session, to) = (args.session.display(), to.display());
+    let (word, session, to) = (shell_path(&to), args.session.display(), to.display());
     Err(Failure::limit(match &report.changed[..] {
         [] => format!(
-            "{session}: some data are lost, as listed\n  next: `skinrig show {to}` and `skinrig analyze` work on what was \
-             recovered; keep the damaged file"
+            "{session}: some data are lost, as listed\n  next: `skinrig show {}` and `skinrig analyze` work on what was \
+             recovered; keep the damaged file",
+            word
         ),
         tables => format!(
             "{session}: values in {} are not those that were recorded, and it is unknown which\n  next: restore the session from \

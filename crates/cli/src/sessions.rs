@@ -10,7 +10,7 @@ use skinrig_text::{Column, Table, cut};
 use crate::analyses;
 use crate::args::SessionsArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::file_name;
+use crate::paths::{file_name, shell_path};
 use crate::shelf::Shelf;
 
 /// Lists the sessions of a folder.
@@ -98,18 +98,18 @@ pub(crate) fn find_running(place: &Path) -> Result<PathBuf, Failure> {
     if writer_of(&session).is_some() {
         return Ok(session);
     }
-    let shown = session.display();
+    let (shown, word) = (session.display(), shell_path(&session));
     let state = SessionReader::open(&session).and_then(|reader| {
         let legs = reader.legs()?; // fails without a header
         Ok((reader.seal()?.is_some(), reader.end()?.is_some(), legs))
     });
     Err(Failure::input(match state {
         Ok((true, ..)) => format!(
-            "{shown}: expected a running session, found a sealed one, which never changes\n  next: `skinrig tag {shown} --note \
-             TEXT` adds a note beside it; `skinrig resume {shown}` continues one that was stopped"
+            "{shown}: expected a running session, found a sealed one, which never changes\n  next: `skinrig tag {word} --note \
+             TEXT` adds a note beside it; `skinrig resume {word}` continues one that was stopped"
         ),
         Ok(_) => format!(
-            "{shown}: expected a running session, found one that no program is running\n  next: `skinrig resume {shown}` continues \
+            "{shown}: expected a running session, found one that no program is running\n  next: `skinrig resume {word}` continues \
             it"
         ),
         Err(e) => e.to_string(),
@@ -135,8 +135,9 @@ pub(crate) fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf
         _ => format!("sessions of {}", known.join(", ")),
     };
     Err(Failure::input(format!(
-        "{}: expected sessions of the prototype `{prototype}`, found {known}\n  next: `skinrig prototypes {0}` lists them",
-        folder.display()
+        "{}: expected sessions of the prototype `{prototype}`, found {known}\n  next: `skinrig prototypes {on}` lists them",
+        folder.display(),
+        on = shell_path(folder)
     )))
 }
 

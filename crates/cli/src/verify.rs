@@ -14,7 +14,7 @@ use crate::analyses;
 use crate::args::VerifyArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
-use crate::paths::{SESSION_SUFFIX, file_name, stem};
+use crate::paths::{SESSION_SUFFIX, file_name, shell_path, stem};
 use crate::phase::Phase;
 use crate::selection;
 use crate::signature;
@@ -45,7 +45,7 @@ pub(crate) fn verify(args: &VerifyArgs, json: bool) -> Outcome {
         } else {
             print(&name, &report);
         }
-        outcome(&name, &report)
+        outcome(&target.path, &report)
     });
     if json {
         targets.print(documents);
@@ -298,14 +298,16 @@ fn print(name: &impl Display, report: &VerifyReport) {
     }
 }
 
-fn outcome(name: &impl Display, report: &VerifyReport) -> Outcome {
+fn outcome(session: &Path, report: &VerifyReport) -> Outcome {
     if report.is_sound() {
         Ok(Exit::Ok)
     } else {
         Err(Failure::limit(format!(
-            "{name}: {} problem(s); the file is not what was recorded\n  next: restore it from a copy, or copy its intact part into a new \
-            session: `skinrig salvage {name}`",
-            report.problems.len() as u64 + report.more_problems
+            "{}: {} problem(s); the file is not what was recorded\n  next: restore it from a copy, or copy its intact part into a new \
+            session: `skinrig salvage {}`",
+            session.display(),
+            report.problems.len() as u64 + report.more_problems,
+            shell_path(session)
         )))
     }
 }

@@ -227,7 +227,7 @@ fn does_not_follow(
     let Some(fit) = as_is.fits[k] else {
         return false;
     };
-    // If most presses share one angle, for instance at a single location, columns cannot follow it. But neither can they move.
+    // If most presses share one angle, for instance at a single location, columns cannot follow it; but then they do not move either.
     if as_is.ignorance_deg[k].max(fit.spread_deg) < MIN_SPREAD_DEG {
         return false;
     }

@@ -69,7 +69,7 @@ pub(crate) fn new(args: &NewArgs, json: bool) -> Outcome {
     }
     outln!(
         "next: set `operator` and `prototype.id`, then `skinrig check {}`",
-        file.display()
+        shell_path(&file)
     );
     Ok(Exit::Ok)
 }

@@ -23,6 +23,7 @@ use crate::analysis_request::AnalysisRequest;
 use crate::args::{OnlineArgs, StopRule};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::library::analysis_for_tables;
+use crate::paths::shell_path;
 use crate::phase::Phase;
 use crate::results::open;
 use crate::selection::result::{self, SelectedResult};
@@ -72,8 +73,9 @@ fn line(estimate: &Estimate) -> serde_json::Value {
 
 fn taught(error: impl std::fmt::Display, session: &Path) -> Failure {
     Failure::input(format!(
-        "{0}: {error}\n  next: `skinrig show {0}` lists what was recorded",
-        session.display()
+        "{0}: {error}\n  next: `skinrig show {on}` lists what was recorded",
+        session.display(),
+        on = shell_path(session)
     ))
 }
 
@@ -295,9 +297,10 @@ fn open_replayable(session: &Path) -> Result<(SessionReader, Analysis), Failure>
     let (analysis, legs) = analysis_for_tables(session, &reader, &id)?;
     if !legs.is_empty() {
         return Err(Failure::input(format!(
-            "{0}: expected a session recorded in one go, found {1} legs\n  next: `skinrig analyze {0}` analyses resumed sessions",
+            "{0}: expected a session recorded in one go, found {1} legs\n  next: `skinrig analyze {on}` analyses resumed sessions",
             session.display(),
-            legs.len() + 1
+            legs.len() + 1,
+            on = shell_path(session)
         )));
     }
     Ok((reader, analysis))
@@ -319,9 +322,10 @@ fn open_valid(
     };
     if !analysis.is_valid() {
         return Err(Failure::limit(format!(
-            "{0}: expected a valid session, found an INVALID one: {1}\n  next: `skinrig analyze {0}` says what to mend",
+            "{0}: expected a valid session, found an INVALID one: {1}\n  next: `skinrig analyze {on}` says what to mend",
             session.display(),
-            analysis.invalid_because().join("; ")
+            analysis.invalid_because().join("; "),
+            on = shell_path(session)
         )));
     }
     Ok((reader, analysis, selected))

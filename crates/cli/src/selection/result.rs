@@ -61,7 +61,7 @@ fn of_selection(variant: &Variant, selected: &SelectedPresses) -> Result<(), Fai
          and the settings that differ, or leave --analysis out",
         name = variant.name,
         selection = selected.name,
-        file = selected.name.file.display(),
+        file = crate::paths::shell_path(&selected.name.file),
     )))
 }
 

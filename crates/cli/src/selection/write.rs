@@ -70,9 +70,10 @@ fn text(args: &SelectArgs) -> Result<String, Failure> {
         let facts = facts(session).map_err(Failure::session)?;
         let Some(hash) = facts.content_sha256 else {
             return Err(Failure::input(format!(
-                "{0}: expected a sealed session, found one that is still running or was cut off\n  next: `skinrig resume {0}` \
+                "{0}: expected a sealed session, found one that is still running or was cut off\n  next: `skinrig resume {on}` \
                  continues and seals it",
-                session.display()
+                session.display(),
+                on = shell_path(session)
             )));
         };
         let file = relative(folder, session)?;

@@ -14,7 +14,7 @@ use skinrig_results::Rescan;
 use super::args::{StoreArgs, StoreCommand, StoreLinkArgs, StorePutArgs};
 use crate::catalogue::automatic;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::{beside, file_name};
+use crate::paths::{beside, file_name, shell_path};
 use crate::phase::Phase;
 use crate::whole_file;
 
@@ -142,7 +142,8 @@ fn put(
     let id = reader.session_id().map_err(Failure::session)?;
     let Some(seal) = reader.seal().map_err(Failure::session)? else {
         return Err(Failure::input(format!(
-            "{shown}: expected a sealed session, found one that is not finished\n  next: `skinrig resume {shown}` seals it"
+            "{shown}: expected a sealed session, found one that is not finished\n  next: `skinrig resume {}` seals it",
+            shell_path(session)
         )));
     };
     drop(reader);
@@ -150,8 +151,9 @@ fn put(
     let report = verify::<Rescan>(session).map_err(Failure::session)?;
     if let Some(problem) = report.problems.first() {
         return Err(Failure::input(format!(
-            "{shown}: expected a sound session, found a damaged one: {problem}\n  next: `skinrig verify {shown}` lists the damage, \
-             `skinrig salvage` copies the intact part"
+            "{shown}: expected a sound session, found a damaged one: {problem}\n  next: `skinrig verify {}` lists the damage, \
+             `skinrig salvage` copies the intact part",
+            shell_path(session)
         )));
     }
     let url = to.join(&name);

@@ -7,7 +7,7 @@ mod skins;
 use std::path::{Path, PathBuf};
 
 use skinrig_compare::flatten;
-use skinrig_compare::twin::{LEAST_SKINS, SkinDraw, twin as fitted};
+use skinrig_compare::twin::{SkinDraw, twin as fitted};
 use skinrig_model::{AnalysisSettings, SimLevel};
 use skinrig_protocol::protocol_with;
 use skinrig_report::twin::{SessionTwin, page, terminal_text};
@@ -18,7 +18,7 @@ use crate::args::TwinArgs;
 use crate::beside_session::{SessionIdentity, TWIN};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::library::{NO_FILE, ProtocolSource};
-use crate::paths::file_name;
+use crate::paths::{file_name, shell_path};
 use crate::phase::Phase;
 use crate::provenance::origin_in_words;
 use crate::results::{check_writable, open, write, write_named};
@@ -43,9 +43,10 @@ pub(crate) fn twin(args: &TwinArgs, command_line: &str, output: Output) -> Outco
     let phase = Phase::reading("analysing the session", aligned.events.bytes_read());
     let session = observed(aligned, path, || {
         format!(
-            "{}: expected a valid session, found an INVALID one: its positions or clocks are wrong\n  next: `skinrig analyze {0}` \
+            "{}: expected a valid session, found an INVALID one: its positions or clocks are wrong\n  next: `skinrig analyze {on}` \
              names the fault",
-            path.display()
+            path.display(),
+            on = shell_path(path)
         )
     })?;
     drop(phase);
@@ -165,10 +166,10 @@ fn same_settings(
 fn failed(skins: &Simulated<SkinDraw>) -> String {
     match skins.failed.first() {
         Some((seed, why)) => format!(
-            "; {} failed, the first with seed {seed}: {why}\n  next: a larger --skins, or `skinrig run` with --seed {seed} to see why",
+            "; {} failed, the first with seed {seed}: {why}\n  next: a larger --skins; some of the skins drawn always fail",
             skins.failed.len()
         ),
-        None => format!("\n  next: --skins, at least {LEAST_SKINS}"),
+        None => "\n  next: a larger --skins".to_owned(),
     }
 }
 

@@ -7,6 +7,7 @@ use serde_json::json;
 use skinrig_recorder::writer_of;
 
 use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::shell_path;
 use crate::remote::{RemoteError, Reply, Request, follow as follow_run};
 use crate::sessions;
 
@@ -33,8 +34,9 @@ pub(super) fn follow(place: &Path, every: Duration) -> Outcome {
                 (Ok(()), None) => {
                     return Err(Failure::internal(format!(
                         "{0}: expected touches until the run ends, found the connection ended before: the run was killed, or this \
-                         program read too slowly\n  next: `skinrig status {0}` shows whether it goes on; then repeat the command",
-                        session.display()
+                         program read too slowly\n  next: `skinrig status {on}` shows whether it goes on; then repeat the command",
+                        session.display(),
+                        on = shell_path(&session)
                     )));
                 }
                 (Err(RemoteError::Failed(why)), None) => {
@@ -64,7 +66,8 @@ pub(super) fn follow(place: &Path, every: Duration) -> Outcome {
 
 fn failure(session: &Path, why: &str) -> Failure {
     Failure::input(format!(
-        "{0}: {why}\n  next: `skinrig show {0}` lists what was recorded",
-        session.display()
+        "{0}: {why}\n  next: `skinrig show {on}` lists what was recorded",
+        session.display(),
+        on = shell_path(session)
     ))
 }

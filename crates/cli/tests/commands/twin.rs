@@ -110,7 +110,7 @@ fn sessions_that_cannot_have_a_twin_are_refused() {
         .expect_stderr(&["expected calibration presses", "evaluation.calibrate"]);
     skinrig(&["twin", &session, "--skins", "10"])
         .code(2)
-        .expect_stderr(&["40..=2000"]);
+        .expect_stderr(&["50..=2000"]);
     let session = recorded(&lab, "s", &[]);
     skinrig(&["twin", &session, "--set", "scene.nois=1"])
         .code(2)
