@@ -320,7 +320,7 @@ fn covers_the_list(analysis: &Analysis, path: &Path<'_>) -> bool {
     2 * located.len() > listed.len() && alike(|p| p.x_mm) && alike(|p| p.y_mm)
 }
 
-/// A camera far from its nominal position; the calibration compensates for it.
+/// A camera far from its nominal position, by the fit near it or else by the calibration, which compensates for it.
 fn far_off(
     analysis: &Analysis,
     path: &Path<'_>,
