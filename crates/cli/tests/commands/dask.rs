@@ -97,12 +97,12 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     all.into_iter().map(read).collect()
 }
 
-/// Starts the command, and waits for its first results.
+/// Starts the command, and waits for the first session that is finished: its report is written last.
 fn under_way(arguments: &[&str], folder: &Path) -> Child {
     let mut command = program(arguments);
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
-    while files(folder, RESULTS).is_empty() && child.try_wait().unwrap().is_none() {
+    while files(folder, REPORT).is_empty() && child.try_wait().unwrap().is_none() {
         std::thread::yield_now();
     }
     child
