@@ -10,7 +10,7 @@ use super::lab::{
 /// Number of random kills.
 fn crashes() -> u64 {
     let requested = std::env::var("SKINRIG_CRASHES").ok();
-    requested.and_then(|n| n.parse().ok()).unwrap_or(16)
+    requested.and_then(|n| n.parse().ok()).unwrap_or(10)
 }
 
 /// Runs the campaign with a fault; false if it finished before, which ends with exit code 2.

@@ -1,6 +1,6 @@
 //! Owns the events cached by one pass, so that the next pass need not read and decode them again.
 
-use skinrig_model::{CdEvent, Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
+use skinrig_model::{CdEvent, Polarity};
 
 /// Maximum number of events per camera: 256 MiB.
 const MAX_EVENTS: usize = 1 << 25;
@@ -31,12 +31,6 @@ impl EventCache {
         let (Some(first), Some(last)) = (events.first(), events.last()) else {
             return true;
         };
-        debug_assert!(events.is_sorted_by_key(|e| e.t_us));
-        debug_assert!(
-            events
-                .iter()
-                .all(|e| e.x < SENSOR_WIDTH && e.y < SENSOR_HEIGHT)
-        );
         if self.packed.is_empty() {
             self.start_us = first.t_us.saturating_sub(TIME_END_US / 2);
         }

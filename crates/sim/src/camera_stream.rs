@@ -81,7 +81,7 @@ impl StreamState {
                 polarity: event.polarity,
             };
             let written = self.encoder.cd(cd, &mut self.fresh);
-            debug_assert!(written.is_ok(), "pixel events out of order: {written:?}");
+            assert!(written.is_ok(), "pixel events out of order: {written:?}");
         }
         while let Some(edge) = self.edges.front().copied()
             && edge.t_ns < to.t_ns
@@ -92,7 +92,7 @@ impl StreamState {
         let reached = self
             .encoder
             .advance_to(clock.own_us(to.t_ns), &mut self.fresh);
-        debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
+        assert!(reached.is_ok(), "time ran backwards: {reached:?}");
     }
 }
 
@@ -130,7 +130,7 @@ fn encode_edge(
             rising: edge.rising,
         };
         let written = encoder.trigger(edge, out);
-        debug_assert!(written.is_ok(), "trigger edges out of order: {written:?}");
+        assert!(written.is_ok(), "trigger edges out of order: {written:?}");
     }
 }
 

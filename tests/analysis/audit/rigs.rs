@@ -294,7 +294,7 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
         if hot {
             noise(15.0, Some((400, 250)));
         }
-        events.sort_by_key(|e| e.t_us);
+        skinrig_planted::sort(events);
     }
     Session {
         input,

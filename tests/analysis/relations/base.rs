@@ -154,7 +154,7 @@ fn background(session: &mut Session, random: &mut Random) {
                 polarity: Polarity::from_bit(random.unit() < 0.5),
             });
         }
-        events.sort_by_key(|e| e.t_us);
+        skinrig_planted::sort(events);
     }
 }
 

@@ -14,7 +14,7 @@ pub(super) fn move_camera(session: &mut Session, k: usize, to: impl Fn(u64) -> u
     for event in &mut session.events[k] {
         event.t_us = to(event.t_us);
     }
-    session.events[k].sort_by_key(|e| e.t_us);
+    skinrig_planted::sort(&mut session.events[k]);
     let input = &mut session.input;
     for edge in &mut input.edges[k] {
         edge.t_us = to(edge.t_us);

@@ -307,7 +307,7 @@ fn hot_pixels_change_nothing_but_a_warning() {
                 polarity: Polarity::from_bit(n % 2 == 0),
             }));
         }
-        events.sort_by_key(|e| e.t_us);
+        skinrig_planted::sort(events);
     }
     let found = analyze(&input, &source).unwrap();
     for (camera, hot) in found.hot_pixels.iter().enumerate() {

@@ -175,7 +175,7 @@ pub fn session_of(seed: u64, shape: &Shape) -> (SessionInput, Memory) {
                 polarity,
             });
         }
-        events.sort_by_key(|e| e.t_us);
+        crate::sort(events);
         // Out of order by a few µs, as a row-wise readout is.
         for i in (0..events.len() - 1).step_by(5) {
             if events[i + 1].t_us - events[i].t_us < 20 {

@@ -207,7 +207,7 @@ impl<'a> Producer<'a> {
                 polarity: event.polarity,
             };
             let written = self.encoder.cd(event, bytes);
-            debug_assert!(written.is_ok(), "pixel events out of order: {written:?}");
+            assert!(written.is_ok(), "pixel events out of order: {written:?}");
         }
         for edge in edges {
             push_edge(&mut self.encoder, *edge, bytes);
@@ -216,7 +216,7 @@ impl<'a> Producer<'a> {
         let reached = self
             .encoder
             .advance_to(end_us.max(self.encoder.reached_us()), bytes);
-        debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
+        assert!(reached.is_ok(), "time ran backwards: {reached:?}");
     }
 
     /// Edges due before `until_ns`, and the number of late ones.
@@ -305,7 +305,7 @@ fn push_edge(encoder: &mut Encoder, edge: TriggerEdge, bytes: &mut Vec<u8>) {
     // An edge behind the encoder's position in a dense slot keeps its place in the stream.
     let t_us = edge.t_us.max(encoder.reached_us());
     let written = encoder.trigger(TriggerEdge { t_us, ..edge }, bytes);
-    debug_assert!(
+    assert!(
         written.is_ok(),
         "a trigger channel that does not exist: {written:?}"
     );
