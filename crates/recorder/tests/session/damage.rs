@@ -84,6 +84,48 @@ fn a_page_that_points_elsewhere_ends_the_reading() {
     }
 }
 
+/// Digests outlive a seal that was removed: rows that differ from them are damage, and are not sealed again.
+#[test]
+fn rows_that_differ_from_digests_without_a_seal_are_not_sealed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let original = folder.path().join("a.session.sqlite");
+    sealed(&original, 4);
+    writable(&original);
+    change(&original, &["DELETE FROM seal"]);
+    for (n, (statement, table)) in [
+        ("UPDATE mark SET t_ns = t_ns + 1500000", "mark"),
+        ("UPDATE device SET serial = '999'", "device"),
+        ("UPDATE setting SET read_back = read_back + 1", "setting"),
+        (
+            "UPDATE robot_from_skin SET t_mm = t_mm + 1",
+            "robot_from_skin",
+        ),
+        ("DELETE FROM preflight", "preflight"),
+        ("DELETE FROM table_digest WHERE name = 'note'", "note"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let path = folder.path().join(format!("{n}.session.sqlite"));
+        std::fs::copy(&original, &path).unwrap();
+        change(&path, &[statement]);
+        let problems = verify::<Evt2>(&path).unwrap().problems;
+        assert!(
+            problems.iter().any(|p| p.place == table),
+            "{statement}: {problems:?}"
+        );
+        match SessionWriter::open_ended::<Evt2>(&path) {
+            Err(RecorderError::Unsound { .. }) => {}
+            other => panic!("{statement}: {:?}", other.err()),
+        }
+    }
+    // The session itself gets its seal again.
+    assert!(verify::<Evt2>(&original).unwrap().is_sound());
+    let writer = SessionWriter::open_ended::<Evt2>(&original).unwrap();
+    writer.finish().unwrap();
+    assert!(verify::<Evt2>(&original).unwrap().sealed);
+}
+
 /// A sealed session whose rows changed gives no results; it can still be looked at.
 #[test]
 fn changed_rows_of_a_sealed_session_are_refused() {
