@@ -126,6 +126,27 @@ fn a_part_of_the_press_list_in_another_order() {
     }
 }
 
+/// Rows in any order within blocks: no single row looks wrong, since all residuals are wide.
+#[test]
+fn a_press_list_in_a_random_order_within_blocks() {
+    let wishes = SessionOptions {
+        places: 81,
+        ..SessionOptions::default()
+    };
+    for block in [4, 8, 20] {
+        names(Fault::OrderOfPresses, |seed| {
+            let mut random = Random::new(seed + 100);
+            let mut order: Vec<usize> = (0..81).collect();
+            for rows in order.chunks_mut(block) {
+                for i in (1..rows.len()).rev() {
+                    rows.swap(i, random.below(i + 1));
+                }
+            }
+            edit(seed, wishes, |input| reorder(input, 0..81, &|i| order[i]))
+        });
+    }
+}
+
 /// Gives each row in `rows` of every repetition the position of row `from` of it.
 fn reorder(
     input: &mut SessionInput,

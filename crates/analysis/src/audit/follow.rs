@@ -9,8 +9,9 @@ use skinrig_model::{CameraId, Point2};
 use super::finding::finding;
 use super::fixed_pixel;
 use super::observed_press::ObservedPress;
+use super::permuted::permuted_rows;
 use super::readings::{MIN_SPREAD_DEG, Path, Reading, ScoredReading, scatter_deg};
-use super::rearranged::rearranged_rows;
+use super::rearranged::{MIN_GAIN, RearrangedRows, rearranged_rows};
 use super::resection::{residuals, spread_deg};
 use super::scale::stretched;
 use super::segments::{ShiftedSegment, locally_shifted_segment, shifted_segment};
@@ -76,8 +77,8 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     if path.places < MANY_PLACES {
         return Vec::new();
     }
-    if let Some(finding) = rearranged(&path, &as_is) {
-        return vec![finding];
+    if let Some(found) = rearranged_rows(&path, &as_is) {
+        return vec![rearranged(&path, &found)];
     }
     if let Some((fault, best)) = likelier(&path, &as_is, &stretched()) {
         return vec![other_reading(&path, &as_is, &best, fault)];
@@ -86,6 +87,15 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
         .into_iter()
         .filter(|camera| does_not_follow(analysis, &path, &as_is, *camera))
         .collect();
+    // Columns that follow nothing may have two faults, which another order of few rows fits in part.
+    let least = if lost.is_empty() {
+        MIN_GAIN
+    } else {
+        2.0 * MIN_GAIN
+    };
+    if let Some(found) = permuted_rows(&path, &as_is, least) {
+        return vec![rearranged(&path, &found)];
+    }
     if !lost.is_empty() {
         return not_following(analysis, &path, &as_is, &lost);
     }
@@ -201,8 +211,7 @@ fn shifted_later(
 }
 
 /// Rows of the list in another order, in both streams.
-fn rearranged(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> {
-    let found = rearranged_rows(path, as_is)?;
+fn rearranged(path: &Path<'_>, found: &RearrangedRows) -> Finding {
     let press = |i: usize| path.presses_seen[i].press;
     let evidence = Evidence::RearrangedRows {
         from: press(found.from),
@@ -213,7 +222,7 @@ fn rearranged(path: &Path<'_>, as_is: &ScoredReading<'_>) -> Option<Finding> {
     let law = Law::CentroidFollowsPosition;
     let mut found = finding(law, Fault::OrderOfPresses, None, evidence);
     found.invalidates = true;
-    Some(found)
+    found
 }
 
 /// Neither cameras near the nominal ones nor the calibrated ones explain the stream.

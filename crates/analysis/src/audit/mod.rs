@@ -22,6 +22,7 @@ mod mark_step;
 mod observed_press;
 mod order;
 mod pattern;
+mod permuted;
 mod readings;
 mod rearranged;
 mod recording_gaps;

@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::readings::{Path, ScoredReading};
-use super::resection::wrapped_deg;
+use super::resection::{Resection, wrapped_deg};
 use super::statistics::median;
 
 /// Evidence of a press against its own position that counts for nothing, nats (2.4 standard deviations): a skin's own errors are
@@ -19,15 +19,15 @@ const MAX_REPETITIONS: f64 = 2.0;
 /// Cost of the begin or end of a block, nats: a thousand blocks begin at each row.
 const CHANGE: f64 = 12.0;
 /// Minimum gain, nats.
-const MIN_GAIN: f64 = 25.0;
+pub(super) const MIN_GAIN: f64 = 25.0;
 /// Minimum number of rows that the cameras see elsewhere,
-const MIN_ROWS: usize = 6;
+pub(super) const MIN_ROWS: usize = 6;
 /// this many standard deviations from their own position,
 const ELSEWHERE_SIGMAS: f64 = 4.0;
 /// and at most this many from the other one.
 const THERE_SIGMAS: f64 = 2.5;
 /// Largest distance of a row from the one that it reads.
-const FAR: usize = 300;
+pub(super) const FAR: usize = 300;
 /// Number of such distances.
 const NEAR: usize = 2 * FAR + 1;
 
@@ -55,7 +55,7 @@ pub(crate) fn rearranged_rows(
     let lists = lists(path);
     let mut proposed = as_is.reading.clone();
     for list in &lists {
-        let (read, _) = Rows::new(path, as_is, list, 0.0).likeliest();
+        let (read, _) = Rows::new(path, &as_is.fits, list, 0.0).likeliest();
         for presses in list {
             let at = read
                 .iter()
@@ -68,7 +68,7 @@ pub(crate) fn rearranged_rows(
     }
     let proposed = path.score(&proposed);
     let found = lists.iter().filter_map(|list| {
-        let found = Rows::new(path, &proposed, list, FREE).rearranged()?;
+        let found = Rows::new(path, &proposed.fits, list, FREE).rearranged()?;
         Some(RearrangedRows {
             from: list[0].start + found.from,
             to: list[0].start + found.to,
@@ -79,7 +79,7 @@ pub(crate) fn rearranged_rows(
 }
 
 /// The presses of each list: of all repetitions that share it.
-fn lists(path: &Path<'_>) -> Vec<Vec<Range<usize>>> {
+pub(super) fn lists(path: &Path<'_>) -> Vec<Vec<Range<usize>>> {
     let planned = |r: &Range<usize>| {
         let presses = path.presses_seen[r.clone()].iter();
         presses.map(|t| t.planned).collect::<Vec<_>>()
@@ -119,7 +119,7 @@ impl View {
 }
 
 /// The rows of one list, as both cameras see them in all repetitions that share it.
-struct Rows {
+pub(super) struct Rows {
     n: usize,
     repetitions: usize,
     cameras: [Vec<View>; 2],
@@ -128,14 +128,14 @@ struct Rows {
 }
 
 impl Rows {
-    fn new(
+    pub(super) fn new(
         path: &Path<'_>,
-        judged: &ScoredReading<'_>,
+        fits: &[Option<Resection>; 2],
         repetitions: &[Range<usize>],
         free: f64,
     ) -> Self {
         let view = |k: usize, range: &Range<usize>| {
-            let fit = judged.fits[k]?;
+            let fit = fits[k]?;
             let presses = path.presses_seen[range.clone()].iter();
             let angles = presses.map(|press| Angles {
                 at: fit.camera.angle_of_point_deg(press.at()),
@@ -157,7 +157,7 @@ impl Rows {
     }
 
     /// Cost of row `i` at the position of row `j`, nats.
-    fn loss(&self, i: usize, j: usize) -> f64 {
+    pub(super) fn loss(&self, i: usize, j: usize) -> f64 {
         let free = if i == j { self.free } else { 0.0 };
         let one = |sigmas: f64| ((0.5 * sigmas * sigmas).min(MAX_PRESS) - free).max(0.0);
         let views = self.cameras.iter().flatten();
@@ -167,7 +167,7 @@ impl Rows {
     }
 
     /// True if the cameras see row `i` at row `j` and not at its own position.
-    fn is_elsewhere(&self, i: usize, j: usize) -> bool {
+    pub(super) fn is_elsewhere(&self, i: usize, j: usize) -> bool {
         let off = |j| {
             let usual = self
                 .cameras

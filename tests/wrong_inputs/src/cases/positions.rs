@@ -208,6 +208,22 @@ pub(super) fn rows(t: &mut Table) {
         right_table,
         &[Named(OrderOfPresses), Named(AxesExchanged), Refused],
     );
+    t.papers(
+        "rows in a random order within blocks of six",
+        |s| {
+            import(s, |b| {
+                let mut random = Random::new(s);
+                for rows in b.table.chunks_mut(6) {
+                    for i in (1..rows.len()).rev() {
+                        let j = (random.unit() * (i + 1) as f64) as usize;
+                        rows.swap(i, j);
+                    }
+                }
+            })
+        },
+        right_table,
+        &order,
+    );
     let shifted = [Named(IndexShifted), Refused];
     t.papers(
         "one row on",
