@@ -47,10 +47,15 @@ pub enum OpenError {
         /// Key that needs it.
         key: &'static str,
     },
+    /// The address of the webhook is not one.
+    #[error(
+        "notify.webhook.url: expected an address such as `https://hooks.example.org/bench`, found something else\n  next: correct it"
+    )]
+    Url,
     /// The secret address is not one.
     #[error(
         "notify.webhook.secret_url: expected an address that begins with `https://`, or with `http://` for a server on this \
-         computer, found something else\n  next: correct the variable or file"
+         computer, and a port from 1 to 65535 if it has one, found something else\n  next: correct the variable or file"
     )]
     SecretUrl,
     /// The token cannot be in a header.

@@ -57,11 +57,25 @@ fn uri(webhook: &Webhook, environment: &dyn Fn(&str) -> Option<String>) -> Resul
         (None, Some(at)) => secret::read(at, "webhook.secret_url", environment)?.0,
         (None, None) => return Err(OpenError::SecretUrl),
     };
-    let uri: Uri = text.parse().map_err(|_| OpenError::SecretUrl)?;
-    let host = uri.host().filter(|host| !host.is_empty());
+    let wrong = || match &webhook.url {
+        Some(_) => OpenError::Url,
+        None => OpenError::SecretUrl,
+    };
+    let uri: Uri = text.parse().map_err(|_| wrong())?;
+    let host = uri
+        .host()
+        .filter(|host| !host.is_empty() && has_valid_port(&uri));
     match (uri.scheme_str(), host) {
         (Some("https"), Some(_)) => Ok(uri),
         (Some("http"), Some(host)) if webhook.url.is_some() || is_this_computer(host) => Ok(uri),
-        _ => Err(OpenError::SecretUrl),
+        _ => Err(wrong()),
     }
+}
+
+/// False for a port beyond 65535, or one that is no number: the client would use that of the scheme.
+fn has_valid_port(uri: &Uri) -> bool {
+    let authority = uri.authority().map_or("", |authority| authority.as_str());
+    let server = authority.rsplit('@').next().unwrap_or_default();
+    let after_host = server.rsplit(']').next().unwrap_or_default();
+    !after_host.contains(':') || uri.port_u16().is_some_and(|port| port > 0)
 }

@@ -234,6 +234,17 @@ fn addresses(f: &Field, out: &mut Collector) -> Option<Vec<String>> {
     f.items().iter().map(|item| address(item, out)).collect()
 }
 
+/// True for a host, with or without a port.
+fn is_server(text: &str) -> bool {
+    // An address of IPv6 is in brackets, since it has colons of its own.
+    let (host, port) = match text.rsplit_once(':') {
+        Some((host, port)) if !port.ends_with(']') => (host, Some(port)),
+        _ => (text, None),
+    };
+    let is_host = !host.is_empty() && (host.starts_with('[') || !host.contains(':'));
+    is_host && port.is_none_or(|port| port.parse().is_ok_and(|port: u16| port > 0))
+}
+
 /// The address of a webhook, without a password in it.
 fn url(f: &Field, out: &mut Collector) -> Option<String> {
     let text = plain(f, out)?;
@@ -241,7 +252,8 @@ fn url(f: &Field, out: &mut Collector) -> Option<String> {
         .strip_prefix("https://")
         .or_else(|| text.strip_prefix("http://"));
     let host = rest.and_then(|rest| rest.split(['/', '?', '#']).next());
-    let host = host.filter(|host| !host.is_empty() && text.chars().all(|c| c.is_ascii_graphic()));
+    let is_plain = text.chars().all(|c| c.is_ascii_graphic());
+    let host = host.filter(|host| is_plain && (host.contains('@') || is_server(host)));
     let Some(host) = host else {
         out.error(
             f.span,

@@ -187,7 +187,15 @@ fn secrets_are_checked_before_anything_is_sent() {
     assert!(with(&of_file).unwrap_err().contains("empty line"));
     std::fs::write(&file, format!("{SECRET}\nmore\n")).unwrap();
     with(&of_file).unwrap();
-    for wrong in ["hooks.example.org", "http://hooks.example.org/", "https://"] {
+    for wrong in [
+        "hooks.example.org",
+        "http://hooks.example.org/",
+        "https://",
+        "https://hooks.example.org:99999/",
+        "https://hooks.example.org:1x/",
+        "http://127.0.0.1:0/",
+        "https://[::1]:99999/",
+    ] {
         std::fs::write(&file, wrong).unwrap();
         let lines = format!("  webhook: {{secret_url: {of_file}}}\n");
         let error = open(&settings(&lines)).map(|_| ()).unwrap_err().to_string();

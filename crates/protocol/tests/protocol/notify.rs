@@ -103,6 +103,38 @@ fn a_login_without_encryption_needs_a_server_on_this_computer() {
     }
 }
 
+/// A client would take the usual port for one that cannot be.
+#[test]
+fn a_webhook_has_a_host_and_a_port_that_can_be() {
+    let with = |address: &str| suite(&format!("notify:\n  webhook: {{url: \"{address}\"}}\n"));
+    for address in [
+        "https://hooks.example.org",
+        "https://hooks.example.org/bench?a=b:c",
+        "http://127.0.0.1:65535/x",
+        "http://[::1]:8080/x",
+        "http://[::1]/x",
+    ] {
+        with(address).unwrap_or_else(|e| panic!("{address}: {e}"));
+    }
+    for address in [
+        "http://127.0.0.1:99999/x",
+        "http://127.0.0.1:65536",
+        "http://127.0.0.1:0/x",
+        "http://127.0.0.1:-1/x",
+        "http://127.0.0.1:18080x/x",
+        "http://127.0.0.1:/x",
+        "http://:18080/x",
+        "http://[::1]:99999/x",
+        "https://",
+    ] {
+        let refused = with(address).map(|_| ()).unwrap_err();
+        assert!(
+            refused.contains("address of a webhook"),
+            "{address}: {refused}"
+        );
+    }
+}
+
 /// Sessions record the rig file as JSON with the values of its variables: none of them may be a secret.
 #[test]
 fn the_recorded_rig_file_names_variables_without_their_values() {
