@@ -135,6 +135,17 @@ pub struct SessionFigures {
 }
 
 impl SessionFigures {
+    /// The nearest value that a session can have: a share of presses is one of whole presses, all others are as they are.
+    pub(crate) fn attainable(&self, figure: SessionFigure, value: f64) -> f64 {
+        let presses = f64::from(self.presses);
+        match figure {
+            SessionFigure::Located if self.presses > 0 => (value * presses).round() / presses,
+            _ => value,
+        }
+    }
+}
+
+impl SessionFigures {
     /// Of an analysis and the statistics of its cameras. A figure that does not exist, or is no number, is left out.
     #[must_use]
     pub fn of(analysis: &Analysis, cameras: &[EventStatistics]) -> Self {

@@ -179,11 +179,21 @@ pub fn twin(session: &Observed, skins: &[SkinDraw]) -> Result<Twin, NoTwin> {
     if !unlike.is_like() {
         return Ok(unlike);
     }
-    let outcome = |figure: SessionFigure| OutcomePrediction {
-        figure,
-        predicted: predicted(figure, &rows, &own, &kept, |skin| Some(&skin.outcomes)),
-        recorded: session.outcomes.get(figure),
-        changed: predicted(figure, &rows, &own, &kept, |skin| skin.changed.as_ref()),
+    let outcome = |figure: SessionFigure| {
+        // An end just below all presses would leave out a session that locates all.
+        let attainable = |found: Interval| Interval {
+            low: session.outcomes.attainable(figure, found.low),
+            high: session.outcomes.attainable(figure, found.high),
+            ..found
+        };
+        let own_skins = predicted(figure, &rows, &own, &kept, |skin| Some(&skin.outcomes));
+        let changed = predicted(figure, &rows, &own, &kept, |skin| skin.changed.as_ref());
+        OutcomePrediction {
+            figure,
+            predicted: own_skins.map(attainable),
+            recorded: session.outcomes.get(figure),
+            changed: changed.map(attainable),
+        }
     };
     Ok(Twin {
         constants: constants(&Design::new(&rows, &own), &kept),

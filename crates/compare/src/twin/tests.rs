@@ -211,6 +211,23 @@ fn an_outcome_that_does_not_vary_has_no_interval() {
     assert_eq!(outcome(&found, SessionFigure::Rmse).predicted, None);
 }
 
+/// The ends of a share are whole presses, so that a session that locates all of them is inside an interval that ends just below.
+#[test]
+fn a_predicted_share_ends_at_whole_presses() {
+    let mut table = skins(8, 60);
+    for (n, skin) in table.iter_mut().enumerate() {
+        let located = if n % 6 == 0 { 0.975 } else { 1.0 };
+        skin.outcomes = SessionFigures::with(&[(SessionFigure::Located, located)]);
+    }
+    let mut session = observed(&skin(9));
+    session.outcomes = SessionFigures::with(&[(SessionFigure::Located, 1.0)]);
+    let found = twin(&session, &table).unwrap();
+    let predicted = outcome(&found, SessionFigure::Located).predicted.unwrap();
+    assert_eq!(predicted.high, 1.0);
+    let presses = 40.0 * predicted.low;
+    assert_eq!(presses, presses.round());
+}
+
 #[test]
 fn draws_cover_their_range_evenly() {
     let draws: Vec<Vec<f64>> = (0..2_000).map(TwinConstant::draw).collect();
