@@ -1,11 +1,17 @@
 //! `skinrig salvage`.
 
-use skinrig_recorder::{SESSION_SUFFIX, SalvageReport, salvage as recover};
+use std::path::Path;
+
+use skinrig_recorder::{
+    RecorderError, SESSION_SUFFIX, SalvageReport, SessionReference, copy_session,
+    salvage as recover,
+};
 use skinrig_text::{Column, Table};
 
 use crate::args::SalvageArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::{beside, shell_path};
+use crate::paths::{beside, file_name, shell_path};
+use crate::phase::Phase;
 
 /// Copies the intact part of a damaged session into a new one, and lists what was lost.
 ///
@@ -16,7 +22,7 @@ pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
         .out
         .clone()
         .unwrap_or_else(|| beside(&args.session, &format!(".salvaged{SESSION_SUFFIX}")));
-    let report = recover(&args.session, &to).map_err(Failure::session)?;
+    let report = recovered(&args.session, &to).map_err(Failure::session)?;
     if json {
         let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;
         value["whole"] = report.is_whole().into();
@@ -42,6 +48,23 @@ pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
             tables.join(", ")
         ),
     }))
+}
+
+/// Like `recover`, of a reference by a copy of its object.
+fn recovered(session: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
+    if SessionReference::of(session)?.is_none() {
+        return recover(session, to);
+    }
+    let fetched = beside(to, ".fetched");
+    // Of an earlier command that was killed.
+    let _ = std::fs::remove_file(&fetched);
+    let phase = Phase::begin(&format!("fetching {}", file_name(session)));
+    let report = copy_session(session, &fetched).and_then(|()| {
+        drop(phase);
+        recover(&fetched, to)
+    });
+    let _ = std::fs::remove_file(&fetched);
+    report
 }
 
 fn print(report: &SalvageReport) {

@@ -118,16 +118,25 @@ fn put(
     to: &ObjectUrl,
     session: &Path,
 ) -> Result<Moved, Failure> {
+    let name = file_name(session);
+    let shown = session.display();
     if let Some(known) = SessionReference::of(session).map_err(Failure::session)? {
+        let url = to.join(&name).to_string();
+        if known.url != url {
+            return Err(Failure::input(format!(
+                "{shown}: expected the file of a session, found a reference to {}, not to {url}\n  next: `skinrig store get {}` fetches it, \
+                 then repeat the command",
+                known.url,
+                shell_path(session)
+            )));
+        }
         return Ok(Moved {
             session: session.to_owned(),
-            url: known.url,
+            url,
             bytes: known.bytes,
             changed: false,
         });
     }
-    let name = file_name(session);
-    let shown = session.display();
     if !name.ends_with(SESSION_SUFFIX) {
         return Err(Failure::input(format!(
             "{shown}: expected a name that ends with `{SESSION_SUFFIX}`, found another\n  next: rename the file"
@@ -211,8 +220,10 @@ fn get(session: &Path) -> Result<Moved, Failure> {
         let report = verify::<Rescan>(&fetched).map_err(Failure::session)?;
         if let Some(problem) = report.problems.first() {
             return Err(Failure::input(format!(
-                "{shown}: expected the session that was sent to {}, found it damaged: {problem}\n  next: restore the object from a copy",
-                reference.url
+                "{shown}: expected the session that was sent to {}, found it damaged: {problem}\n  next: restore the object from a copy, or \
+                 copy its intact part into a new session: `skinrig salvage {}`",
+                reference.url,
+                shell_path(session)
             )));
         }
         std::fs::rename(&fetched, session).map_err(|e| Failure::internal(format!("{shown}: cannot replace the reference: {e}")))

@@ -197,11 +197,35 @@ fn what_cannot_be_moved_stays_and_says_what_to_do() {
         .expect_stderr(&["no such session file", "1 of 2 sessions stay as they are"]);
     assert!(std::fs::metadata(&session).unwrap().len() < 1000);
 
-    // The file is needed, the object is not the session, the store is gone.
+    // It is where it is, not elsewhere.
     store
-        .skinrig(&["salvage", &file])
+        .skinrig(&["store", "put", &file, "--to", "s3://lab/third"])
         .code(2)
-        .expect_stderr(&["`skinrig store get"]);
+        .expect_stderr(&[
+            "a reference to s3://lab/else/",
+            "not to s3://lab/third/",
+            "`skinrig store get",
+        ]);
+
+    // What is salvaged is the object.
+    let copy = lab.text("t/copy.session.sqlite");
+    store.skinrig(&["salvage", &file, "--out", &copy]).code(0);
+    store.skinrig(&["verify", &copy]).code(0);
+    assert_eq!(
+        std::fs::read_dir(lab.path("t"))
+            .unwrap()
+            .filter(|e| {
+                e.as_ref()
+                    .unwrap()
+                    .file_name()
+                    .to_string_lossy()
+                    .contains(".fetched")
+            })
+            .count(),
+        0
+    );
+
+    // The object is not the session, the store is gone.
     let reference = std::fs::read_to_string(&session).unwrap();
     std::fs::write(&session, reference.replace("lab/else", "lab/2026")).unwrap();
     for command in [
