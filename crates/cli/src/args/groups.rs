@@ -1,7 +1,5 @@
 //! The list of commands in the help, grouped by task.
 
-use std::collections::BTreeMap;
-
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches};
 
@@ -101,30 +99,58 @@ fn unread_negative(error: &clap::Error, words: &[std::ffi::OsString]) -> Option<
     ))
 }
 
-/// Says which value of a protocol is given twice and differently, by `--set` or by an option of its own; `None` if none is.
+/// Options and arguments with values `KEY=VALUE`, and what precedes each on the command line.
+const ASSIGNMENTS: [(&str, &str); 3] = [
+    ("overrides", "--set "),
+    ("margins", "--margin "),
+    ("parameters", ""),
+];
+
+/// Says which key is given twice and differently, by `KEY=VALUE` or by an option of its own; `None` if none is.
 fn given_twice(matches: &ArgMatches) -> Option<String> {
     let (_, matches) = matches.subcommand()?;
-    let overrides = matches.try_get_many::<String>("overrides").ok()??;
-    let option = |id: &str| {
-        let given = matches.try_get_raw(id).ok()??.next()?;
-        Some(given.to_string_lossy().into_owned())
+    given_twice(matches).or_else(|| {
+        let mut all = ASSIGNMENTS.into_iter();
+        all.find_map(|(id, prefix)| contradiction(matches, id, prefix))
+    })
+}
+
+fn contradiction(matches: &ArgMatches, id: &str, prefix: &str) -> Option<String> {
+    let raw = |id: &str| -> Vec<String> {
+        let given = matches.try_get_raw(id).ok().flatten();
+        let texts = given.into_iter().flatten();
+        texts.map(|t| t.to_string_lossy().into_owned()).collect()
     };
-    let mut given: BTreeMap<&str, (String, String)> = BTreeMap::new();
-    for (key, id) in [("seed", "seed"), ("scene.level", "level")] {
-        if let Some(value) = option(id) {
-            given.insert(key, (value.clone(), format!("--{id} {value}")));
+    // Key, value, and how they were given.
+    let mut given: Vec<(String, String, String)> = Vec::new();
+    if id == "overrides" {
+        for (key, option) in [("seed", "seed"), ("scene.level", "level")] {
+            let values = raw(option).into_iter().take(1);
+            given.extend(values.map(|v| (key.to_owned(), v.clone(), format!("--{option} {v}"))));
         }
     }
-    for (key, value) in overrides.filter_map(|text| text.split_once('=')) {
-        let how = format!("--set {key}={value}");
-        match given.insert(key, (value.to_owned(), how.clone())) {
-            Some((earlier, by)) if earlier != value => {
+    for text in raw(id) {
+        let Some((key, value)) = text.split_once('=') else {
+            continue;
+        };
+        let by = format!("{prefix}{text}");
+        for (earlier, earlier_value, earlier_by) in &given {
+            if earlier == key && earlier_value != value {
                 return Some(format!(
-                    "expected one value of `{key}`, found `{by}` and `{how}`"
+                    "expected one value of `{key}`, found `{earlier_by}` and `{by}`"
                 ));
             }
-            _ => {}
+            let is_part = |whole: &str, part: &str| {
+                part.strip_prefix(whole)
+                    .is_some_and(|rest| rest.starts_with('.'))
+            };
+            if is_part(earlier, key) || is_part(key, earlier) {
+                return Some(format!(
+                    "expected a map or single keys of it, found `{earlier_by}` and `{by}`\n\n  tip: set each key on its own, or all in the map"
+                ));
+            }
         }
+        given.push((key.to_owned(), value.to_owned(), by));
     }
     None
 }
