@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use chrono::{DateTime, Utc};
+use chrono::{DateTime, NaiveDateTime, Utc};
 use skinrig_nightly::Night;
 
 /// Results for programs.
@@ -15,6 +15,8 @@ pub const PAGE: &str = "night.html";
 pub const TRENDS: &str = "trends.html";
 /// Results for CI servers.
 pub const JUNIT: &str = "junit.xml";
+/// Start of a night in the name of its folder.
+const STARTED: &str = "%Y-%m-%dT%H-%M-%SZ";
 /// Maximum number of nights that start in the same second.
 const MAX_PER_SECOND: usize = 100;
 
@@ -34,6 +36,14 @@ pub struct CreateError {
     source: io::Error,
 }
 
+/// True for a path whose name begins like those of nights.
+#[must_use]
+pub fn is_named_so(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let started = NaiveDateTime::parse_and_remainder(&name, STARTED);
+    started.is_ok_and(|(_, rest)| rest.starts_with('-'))
+}
+
 impl NightFolder {
     /// Creates the folder of a new night of `suite` in `out`. Its name, the night's id, is unique in `out`.
     ///
@@ -45,11 +55,7 @@ impl NightFolder {
             source,
         };
         fs::create_dir_all(out).map_err(|e| error(out, e))?;
-        let first = format!(
-            "{}-{}",
-            started.format("%Y-%m-%dT%H-%M-%SZ"),
-            file_name(suite)
-        );
+        let first = format!("{}-{}", started.format(STARTED), file_name(suite));
         let mut id = first.clone();
         let mut number = 1;
         loop {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::trend::derived::RATIOS;
 use skinrig_nightly::trend::{
-    Acceptance, Filter, History, NightSummary, NoSuchNights, Series, SuiteNights,
+    Acceptance, Filter, History, NightSummary, NoSuchNights, Series, SuiteNights, is_charted,
 };
 use skinrig_nightly::{Night, unsound};
 use tokio::runtime::Runtime;
@@ -182,7 +182,7 @@ pub fn accept(path: &Path, history: &History, acceptance: &Acceptance) -> Result
     };
     let known = |name: &String| {
         let derived = RATIOS.iter().any(|r| r.name == name);
-        derived || history.series.iter().any(|s| s.name == *name)
+        derived || is_charted(name) && history.series.iter().any(|s| s.name == *name)
     };
     if let Some(name) = acceptance.series.as_ref().filter(|name| !known(name)) {
         return Err(not_found(

@@ -87,11 +87,24 @@ impl Rebuild {
 pub(super) fn rebuild(path: &Path, nights: &Path) -> Result<usize, Failure> {
     let cannot = |e| Failure::input(format!("--rebuild: {}: {e}", nights.display()));
     let entries = std::fs::read_dir(nights).map_err(cannot)?;
-    let entries = entries.map(|e| e.map(|e| e.path().join(night_folder::JSON)));
-    let mut night_files: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
-    night_files.retain(|json| json.is_file());
-    night_files.sort();
+    let entries = entries.map(|e| e.map(|e| e.path()));
+    let mut folders: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
+    folders.sort();
+    let (with_results, others): (Vec<PathBuf>, Vec<PathBuf>) = folders
+        .into_iter()
+        .partition(|folder| folder.join(night_folder::JSON).is_file());
+    let night_files: Vec<PathBuf> = with_results
+        .into_iter()
+        .map(|folder| folder.join(night_folder::JSON))
+        .collect();
     let mut all = Rebuild::of(path).map_err(Failure::input)?;
+    for unfinished in others.iter().filter(|path| night_folder::is_named_so(path)) {
+        errln!(
+            "note: {} is of a night that ended without a {}",
+            unfinished.display(),
+            night_folder::JSON
+        );
+    }
     for json in &night_files {
         let home = json.parent().unwrap_or(nights);
         let added = history::read_night(json).and_then(|night| {

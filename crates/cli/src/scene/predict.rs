@@ -12,7 +12,7 @@ use crate::analysis_request::AnalysisRequest;
 use crate::args::ScenePredictArgs;
 use crate::beside_session::{SCENE, SessionIdentity};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::file_name;
+use crate::paths::{file_name, shell_path};
 use crate::phase::Phase;
 use crate::provenance::origin_in_words;
 use crate::results::{check_writable, open, write, write_named};
@@ -39,9 +39,9 @@ pub(super) fn predict(args: &ScenePredictArgs, command_line: &str, output: Outpu
     let phase = Phase::reading("analysing the session", aligned.events.bytes_read());
     let session = figures(aligned, path, || {
         format!(
-            "{}: expected a valid session, found an INVALID one: its positions or clocks are wrong, not its scene\n  next: `skinrig \
-             analyze {0}` names the fault",
-            path.display()
+            "{}: expected a valid session, found an INVALID one, which says nothing about its scene\n  next: `skinrig analyze {}` says why",
+            path.display(),
+            shell_path(path)
         )
     })?;
     drop(phase);

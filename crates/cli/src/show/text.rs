@@ -130,7 +130,7 @@ fn analysis(analysis: &Analysis) {
             ..
         } => {
             let why = if faults.is_empty() {
-                ": clocks unknown"
+                "; its report says why,"
             } else {
                 ""
             };

@@ -43,8 +43,7 @@ pub(crate) fn twin(args: &TwinArgs, command_line: &str, output: Output) -> Outco
     let phase = Phase::reading("analysing the session", aligned.events.bytes_read());
     let session = observed(aligned, path, || {
         format!(
-            "{}: expected a valid session, found an INVALID one: its positions or clocks are wrong\n  next: `skinrig analyze {on}` \
-             names the fault",
+            "{}: expected a valid session, found an INVALID one\n  next: `skinrig analyze {on}` says why",
             path.display(),
             on = shell_path(path)
         )

@@ -21,5 +21,5 @@ pub use change::ChangeWindow;
 pub use chart::{Chart, ChartPoint, Direction, Excursion, SeriesState, chart};
 pub use history::{Acceptance, History, NightSummary, Point, Series};
 pub use reference::Reference;
-pub use report::{Alarm, Report, judge};
+pub use report::{Alarm, Report, is_charted, judge};
 pub use suites::{Filter, NoSuchNights, SuiteNights};

@@ -18,6 +18,13 @@ pub const NIGHTS_PER_FALSE_ALARM: f64 = 1200.0;
 /// Metrics without a stable level: free disk space shrinks by design and has its own limit.
 const NOT_CHARTED: &[&str] = &["free"];
 
+/// False for a series that has no chart, and so no reference.
+#[must_use]
+pub fn is_charted(series: &str) -> bool {
+    let metric = series.rsplit('/').next().unwrap_or_default();
+    !NOT_CHARTED.contains(&metric)
+}
+
 /// Trend report of a bench.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
@@ -74,14 +81,10 @@ fn unmeasured(charts: &[Chart]) -> impl Iterator<Item = &Chart> {
 /// Judges all series of `history` and the ratios derived from them.
 #[must_use]
 pub fn judge(history: &History) -> Report {
-    let charted = |name: &str| {
-        let metric = name.rsplit('/').next().unwrap_or_default();
-        !NOT_CHARTED.contains(&metric)
-    };
     let mut series: Vec<_> = history
         .series
         .iter()
-        .filter(|s| charted(&s.name))
+        .filter(|s| is_charted(&s.name))
         .cloned()
         .collect();
     series.extend(ratios(history));
