@@ -11,7 +11,7 @@ use super::rearranged::{FAR, MIN_ROWS, RearrangedRows, Rows, lists};
 const TURNS: usize = 8;
 /// Exchanges of all pairs at most in each turn.
 const PASSES: usize = 40;
-/// Residual below which rows are not looked for elsewhere, degrees: with the rows at their own positions it is 1 to 2.
+/// Residual below which no other order is looked for, degrees: 1.3 mm at 50 mm from a camera, less than rows are apart.
 const LEAST_SPREAD_DEG: f64 = 1.5;
 /// Nats per moved row: one of two rows moves (0.7), and each position is read once, which leaves a row fewer by a factor of e to choose
 /// from (the permanent of a band matrix: Van der Waerden's bound).
