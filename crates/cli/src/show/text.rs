@@ -130,7 +130,7 @@ fn analysis(analysis: &Analysis) {
             ..
         } => {
             let why = if faults.is_empty() {
-                "; its report says why,"
+                " (its report says why)"
             } else {
                 ""
             };

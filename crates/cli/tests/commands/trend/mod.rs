@@ -444,6 +444,21 @@ fn an_alarm_that_is_raised_tonight_leads_to_tonight() {
         element_text(&shown, "headline"),
         "All within limits, but the computer probably moved"
     );
+    // Free disk space shrinks by design: it has no chart, and so no reference to restart.
+    let tonight = folder.file_name().unwrap().to_string_lossy().into_owned();
+    let free = ["disk/computer/free", "--night", &tonight, "--reason", "r"];
+    nights
+        .accept(&free)
+        .code(2)
+        .expect_stderr(&["a series disk/computer/free", "no series of that name"]);
+    let rate = [
+        "disk/computer/write_rate",
+        "--night",
+        &tonight,
+        "--reason",
+        "r",
+    ];
+    nights.accept(&rate).code(0);
 }
 
 /// The messages are sent after the history has the night, so `night.json` may differ from then on; adding it again changes nothing.

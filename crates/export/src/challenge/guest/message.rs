@@ -112,11 +112,18 @@ struct AnswerRegion {
 
 /// Reads an answer to `fit`.
 pub(super) fn introduction(line: &str) -> Result<Introduction, GuestError> {
-    serde_json::from_str(line).map_err(|e| GuestError::Unexpected {
+    let refused = |why: String| GuestError::Unexpected {
         to: "`fit`".to_owned(),
         expected: r#"{"name": NAME, "version": VERSION}"#,
-        found: format!("{e}: {}", shown(line)),
-    })
+        found: format!("{why}: {}", shown(line)),
+    };
+    let found: Introduction = serde_json::from_str(line).map_err(|e| refused(e.to_string()))?;
+    // Both are printed.
+    let is_plain = |text: &str| !text.trim().is_empty() && !text.chars().any(char::is_control);
+    if !is_plain(&found.name) || !is_plain(&found.version) {
+        return Err(refused("an empty text or control characters".to_owned()));
+    }
+    Ok(found)
 }
 
 /// Reads an answer to `locate` for `press`; `None`: not located.
@@ -155,9 +162,10 @@ pub(super) fn position(line: &str, press: u32) -> Result<Option<Position>, Guest
     Ok(Some(Position { at, region }))
 }
 
-/// The beginning of a line.
+/// The beginning of a line, without control characters.
 fn shown(line: &str) -> String {
     const MOST: usize = 120;
+    let line = line.replace(char::is_control, " ");
     match line.char_indices().nth(MOST) {
         Some((end, _)) => format!("`{}…`", &line[..end]),
         None => format!("`{line}`"),
@@ -199,5 +207,16 @@ mod tests {
         }
         let text = introduction("{}").unwrap_err().to_string();
         assert!(text.contains("`fit`") && text.contains("name"), "{text}");
+        introduction(r#"{"name": "a b", "version": "1"}"#).unwrap();
+        for line in [
+            r#"{"name": "a\u001b[31m", "version": "1"}"#,
+            r#"{"name": "a", "version": "1\n"}"#,
+            r#"{"name": " ", "version": "1"}"#,
+            "\u{1b}[31m",
+        ] {
+            let text = introduction(line).unwrap_err().to_string();
+            assert!(text.contains("`fit`"), "{text}");
+            assert!(!text.contains('\u{1b}'), "{text:?}");
+        }
     }
 }
