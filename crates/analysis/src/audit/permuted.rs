@@ -5,7 +5,7 @@
 //! chosen among many always fits better.
 
 use super::readings::{Path, ScoredReading};
-use super::rearranged::{FAR, MIN_ROWS, RearrangedRows, Rows, lists};
+use super::rearranged::{FAR, MIN_ROWS, RearrangedRows, Rows, lists, reorder};
 
 /// Turns at most; the order usually stays after three.
 const TURNS: usize = 8;
@@ -48,12 +48,7 @@ pub(crate) fn permuted_rows(
         }
         read = next;
         for (list, read) in lists.iter().zip(&read) {
-            for presses in list {
-                let at = read
-                    .iter()
-                    .map(|row| Some(path.presses_seen[presses.start + row].at()));
-                reading.at.splice(presses.clone(), at);
-            }
+            reorder(&mut reading, path, list, read);
         }
         fits = path.score(&reading).fits;
     }

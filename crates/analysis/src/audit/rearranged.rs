@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::readings::{Path, ScoredReading};
+use super::readings::{Path, Reading, ScoredReading};
 use super::resection::{Resection, wrapped_deg};
 use super::statistics::median;
 
@@ -56,12 +56,7 @@ pub(crate) fn rearranged_rows(
     let mut proposed = as_is.reading.clone();
     for list in &lists {
         let (read, _) = Rows::new(path, &as_is.fits, list, 0.0).likeliest();
-        for presses in list {
-            let at = read
-                .iter()
-                .map(|row| Some(path.presses_seen[presses.start + row].at()));
-            proposed.at.splice(presses.clone(), at);
-        }
+        reorder(&mut proposed, path, list, &read);
     }
     if proposed.at == as_is.reading.at {
         return None;
@@ -76,6 +71,21 @@ pub(crate) fn rearranged_rows(
         })
     });
     found.max_by(|a, b| a.gain.total_cmp(&b.gain))
+}
+
+/// Gives each row of a list the position of the row that it reads.
+pub(super) fn reorder(
+    reading: &mut Reading,
+    path: &Path<'_>,
+    list: &[Range<usize>],
+    read: &[usize],
+) {
+    for presses in list {
+        let at = read
+            .iter()
+            .map(|row| Some(path.presses_seen[presses.start + row].at()));
+        reading.at.splice(presses.clone(), at);
+    }
 }
 
 /// The presses of each list: of all repetitions that share it.
