@@ -6,6 +6,7 @@ mod doctor;
 mod evaluate;
 mod files;
 mod groups;
+mod repeated;
 mod scene;
 mod twin;
 mod values;

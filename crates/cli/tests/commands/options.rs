@@ -143,58 +143,31 @@ fn a_value_given_twice_is_refused_and_not_the_last_one_taken() {
         let run = [&["run", SMALL, "--sessions", "/nowhere"], &twice[..]].concat();
         skinrig(&run).code(2).expect_stderr(&parts);
     }
-    let [one, other] = ["depth=1 mm", "depth=2 mm"];
-    let deeper = [
-        &[
-            "scene",
-            "predict",
-            "a.session.sqlite",
+    // The words before the values, the option of each value, and the two values.
+    let skin = ["scene.skin={thickness: 3 mm}", "scene.skin.thickness=3 mm"];
+    for (command, option, [one, other]) in [
+        (
+            &["scene", "predict", "a.session.sqlite"][..],
             "--set",
-            one,
-            "--set",
-            other,
-        ][..],
-        &[
-            "check",
-            SMALL,
-            "--set",
-            "scene.skin={thickness: 2 mm}",
-            "--set",
-            "scene.skin.thickness=3 mm",
-        ],
-        &[
-            "check",
-            SMALL,
-            "--set",
-            "scene.skin.thickness=3 mm",
-            "--set",
-            "scene.skin={thickness: 3 mm}",
-        ],
-        &[
-            "compare",
-            "a",
-            "b",
+            ["depth=1 mm", "depth=2 mm"],
+        ),
+        (&["check", SMALL], "--set", skin),
+        (&["check", SMALL], "--set", [skin[1], skin[0]]),
+        (
+            &["compare", "a", "b"],
             "--margin",
-            "rmse=0.3mm",
-            "--margin",
-            "rmse=2mm",
-        ],
-        &[
-            "catalogue",
-            "query",
-            "best-prototypes",
-            "min_sessions=1",
-            "min_sessions=5",
-        ],
-    ];
-    for words in deeper {
-        let expected = [words[words.len() - 3], words[words.len() - 1]];
-        let expected = if words[0] == "catalogue" {
-            [words[3], words[4]]
-        } else {
-            expected
-        };
-        skinrig(words).code(2).expect_stderr(&expected);
+            ["rmse=0.3mm", "rmse=2mm"],
+        ),
+        (
+            &["catalogue", "query", "best-prototypes"],
+            "",
+            ["min_sessions=1", "min_sessions=5"],
+        ),
+    ] {
+        let given = [option, one, option, other];
+        let given = given.into_iter().filter(|word| !word.is_empty());
+        let words: Vec<&str> = command.iter().copied().chain(given).collect();
+        skinrig(&words).code(2).expect_stderr(&[one, other]);
     }
     let same = ["check", SMALL, "--set", "depth=1 mm", "--set", "depth=1 mm"];
     skinrig(&same).code(0);
