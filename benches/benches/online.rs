@@ -8,7 +8,7 @@ use skinrig_bench::files::Memory;
 use skinrig_bench::{Table, recording};
 use skinrig_formats::{Decoder, evt2::Encoder};
 use skinrig_model::{CameraId, CdEvent, PressRole, StreamFormat};
-use skinrig_online::{Decoders, Estimate, Live, SkinModel, StreamSettings};
+use skinrig_online::{Decoders, Estimate, Live, SkinModel, StreamSettings, TipCourses};
 
 /// The recording is played this much faster: 1 Mev/s per camera.
 const FASTER: u64 = 125;
@@ -41,7 +41,8 @@ fn main() {
     let events = recording::events(&input);
     let source = Memory(events.clone());
     let analysis = analyze(&input, &source).expect("the recording is valid");
-    let skin = SkinModel::learn(&analysis, &source, 0.13).expect("its presses can be learnt from");
+    let skin = SkinModel::learn(&analysis, &source, &TipCourses::new(), 0.13)
+        .expect("its presses can be learnt from");
     let faster = skin.played_faster(FASTER as f64);
     let clocks = *faster.clocks();
     let streams = CameraId::ALL.map(|camera| bytes(&events[camera.index()]));

@@ -26,6 +26,8 @@ CHANNELS = [
     ("region_minor", "mm"),
     ("region_angle", "deg"),
     ("log_likelihood_ratio", "nats"),
+    ("depth", "mm"),
+    ("depth_within", "mm"),
 ]
 # Squared radius of the ellipse that holds 95 % of a normal distribution in two dimensions: -2 ln(0.05).
 ELLIPSE_95 = -2.0 * math.log(0.05)
@@ -43,7 +45,8 @@ def sample(touch):
     x, y = touch["at_mm"] or (None, None)
     region = touch["region"] or {}
     major, minor = region.get("semi_axes_mm", (None, None))
-    values = [touch["press"], x, y, major, minor, region.get("angle_deg"), touch["llr"]]
+    depth = touch["depth"] or {}
+    values = [touch["press"], x, y, major, minor, region.get("angle_deg"), touch["llr"], depth.get("mm"), depth.get("within_mm")]
     return [float(KINDS.index(touch["kind"]))] + [known(value) for value in values]
 
 

@@ -84,6 +84,7 @@ for line, touch in zip(lines, touches):
     x, y = touch["at_mm"] or (None, None)
     assert same(row["x"], x) and same(row["y"], y), (row, touch)
     assert same(row["press"], touch["press"]) and same(row["log_likelihood_ratio"], touch["llr"])
+    assert same(row["depth"], (touch["depth"] or {}).get("mm")), (row, touch)
     # The time is that of the newest events in the touch, not of its arrival.
     lag = pylsl.local_clock() - at
     assert touch["lag_ms"] * 1e-3 <= lag < touch["lag_ms"] * 1e-3 + 60, (lag, touch)

@@ -12,18 +12,23 @@ pub struct Background {
 }
 
 impl Background {
+    /// Events that a background with this rate adds to a window of this length; 0 without idle time.
+    #[must_use]
+    pub fn events_in(&self, window_us: u64) -> f64 {
+        if self.idle_us == 0 {
+            return 0.0;
+        }
+        self.events as f64 * (window_us as f64 / self.idle_us as f64)
+    }
+
     /// Events that a background with this rate, uniform over the crop, puts within eps of a pixel in a window of this length; 0
     /// without idle time.
     #[must_use]
     pub fn neighbours(&self, settings: &AnalysisSettings, camera: CameraId, window_us: u64) -> f64 {
-        if self.idle_us == 0 {
-            return 0.0;
-        }
         let (first, last) = settings.crop_v[camera.index()];
         let rows = f64::from(last.saturating_sub(first)) + 1.0;
         let pixels = f64::from(SENSOR_WIDTH) * rows;
-        let in_window = self.events as f64 * (window_us as f64 / self.idle_us as f64);
-        in_window * pixels_within(settings.eps_px) / pixels
+        self.events_in(window_us) * pixels_within(settings.eps_px) / pixels
     }
 
     /// Core threshold of DBSCAN for a window of this length.

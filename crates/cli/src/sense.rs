@@ -4,7 +4,9 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use skinrig_controller::{SenseAnswer, SenseFault, SensedTouch, TouchSense};
-use skinrig_model::{CameraId, HostTime, StreamFormat, TouchEstimate, TouchKind, TouchRegion};
+use skinrig_model::{
+    CameraId, HostTime, StreamFormat, TouchDepth, TouchEstimate, TouchKind, TouchRegion,
+};
 use skinrig_online::{Detection, Estimate, Felt, News, Position, SkinModel, Worker};
 use skinrig_protocol::Online;
 
@@ -69,6 +71,7 @@ impl TouchSense for RecordedTouches {
                 kind: touch.kind,
                 at_mm: touch.at_mm,
                 region: touch.region,
+                depth: touch.depth,
                 llr: touch.llr,
             }));
         }
@@ -92,6 +95,7 @@ impl SessionSense {
                 self.answers.push_back(SenseAnswer::Ready {
                     places: skin.places(),
                     has_regions: skin.has_regions(),
+                    has_depths: skin.has_depths(),
                 });
                 self.worker.start(skin);
             }
@@ -151,6 +155,7 @@ impl TouchSense for SessionSense {
                         kind: TouchKind::Skipped,
                         at_mm: None,
                         region: None,
+                        depth: None,
                         llr: None,
                     }));
                 }
@@ -183,6 +188,7 @@ fn felt(d: &Detection, until_sd_ns: i64) -> SensedTouch {
         kind,
         at_mm: is_onset.then_some(d.near_mm),
         region: None,
+        depth: None,
         llr: is_onset.then_some(d.llr),
     }
 }
@@ -197,6 +203,10 @@ fn located(host_us: i64, position: &Position, until_sd_ns: i64) -> SensedTouch {
         region: at.and(position.region).map(|r| TouchRegion {
             semi_axes_mm: r.semi_axes_mm,
             angle_deg: r.angle_deg,
+        }),
+        depth: position.depth.map(|d| TouchDepth {
+            mm: d.mm,
+            within_mm: d.within_mm,
         }),
         llr: None,
     }

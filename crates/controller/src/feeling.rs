@@ -61,6 +61,8 @@ impl Feeling {
     pub(crate) fn fulfilled(&self, react: React, since: HostTime) -> Option<SensedTouch> {
         let touch = self.touch.filter(|t| t.onset > since)?.newest;
         let within = |most: f64| touch.region.is_some_and(|r| r.semi_axes_mm[0] <= most);
-        react.region_mm.is_none_or(within).then_some(touch)
+        let as_deep = |least: f64| touch.depth.is_some_and(|depth| depth.mm >= least);
+        let met = react.region_mm.is_none_or(within) && react.depth_mm.is_none_or(as_deep);
+        met.then_some(touch)
     }
 }

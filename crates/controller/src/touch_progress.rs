@@ -97,6 +97,7 @@ mod tests {
             }),
             at_mm: None,
             region: None,
+            depth: None,
             llr: None,
         }
     }

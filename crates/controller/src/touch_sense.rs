@@ -1,7 +1,7 @@
 //! Touch felt while a run records: what the controller gives an estimator outside it, and gets back.
 
 use skinrig_device::OpenChunk;
-use skinrig_model::{CameraId, HostTime, RawChunk, TouchKind, TouchRegion};
+use skinrig_model::{CameraId, HostTime, RawChunk, TouchDepth, TouchKind, TouchRegion};
 
 /// Feels touches in the bytes of both cameras. The controller never waits for an answer that [`poll`](Self::poll) does not have,
 /// and no limit or guard depends on one.
@@ -31,6 +31,8 @@ pub enum SenseAnswer {
         places: usize,
         /// Whether positions have regions.
         has_regions: bool,
+        /// Whether touches have depths.
+        has_depths: bool,
     },
     /// It reports no touches, or no more, in this run.
     Off(SenseFault),
@@ -62,6 +64,8 @@ pub struct SensedTouch {
     pub at_mm: Option<[f64; 2]>,
     /// Its 95 % region.
     pub region: Option<TouchRegion>,
+    /// Depth that the touch has reached.
+    pub depth: Option<TouchDepth>,
     /// Log likelihood ratio of an onset, nats.
     pub llr: Option<f64>,
 }
@@ -75,6 +79,7 @@ impl SensedTouch {
             kind: TouchKind::Started,
             at_mm: None,
             region: None,
+            depth: None,
             llr: None,
         }
     }

@@ -82,5 +82,8 @@ pub use stopping::{Look, StopAnswer, StopMetric, StopQuestion};
 pub use stream::{ChunkFacts, LostTime, RawChunk, StreamFormat};
 pub use text::UnknownName;
 pub use time::{HostDuration, HostTime};
-pub use touch::{LEAST_PRESSES_OF_REGIONS, Reaction, TouchEstimate, TouchKind, TouchRegion};
+pub use touch::{
+    LEAST_PRESSES_OF_DEPTHS, LEAST_PRESSES_OF_REGIONS, Reaction, TouchDepth, TouchEstimate,
+    TouchKind, TouchRegion,
+};
 pub use trigger_box::{BoxReport, BoxTime};

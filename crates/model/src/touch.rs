@@ -48,6 +48,15 @@ pub struct TouchRegion {
     pub angle_deg: f64,
 }
 
+/// A depth that a touch has reached, with the 95 % interval that holds at every instant of the touch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TouchDepth {
+    /// mm; at least 0.
+    pub mm: f64,
+    /// The interval reaches so far to both sides, mm; positive.
+    pub within_mm: f64,
+}
+
 /// An estimate made while the session was recorded, or the reaction of a press to it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TouchEstimate {
@@ -65,6 +74,8 @@ pub struct TouchEstimate {
     pub at_mm: Option<[f64; 2]>,
     /// Its region; `None` if the calibration presses do not determine it.
     pub region: Option<TouchRegion>,
+    /// Depth that the touch has reached; `None` if the calibration presses do not determine it.
+    pub depth: Option<TouchDepth>,
     /// Log likelihood ratio of an onset against the background, nats.
     pub llr: Option<f64>,
 }
@@ -76,12 +87,14 @@ pub enum Reaction {
     /// Stops where it is and holds there, instead of going on to its depth.
     #[default]
     Stop,
-    /// Ends its hold.
+    /// Ends its hold; at a stated depth also the way down.
     Lift,
 }
 
-/// Least number of calibration presses of which an online estimator learns 95 % regions.
+/// Least number of calibration presses of which an online estimator learns 95 % regions,
 pub const LEAST_PRESSES_OF_REGIONS: usize = 24;
+/// and depths with their 95 % intervals.
+pub const LEAST_PRESSES_OF_DEPTHS: usize = 19;
 
 impl Reaction {
     /// What a press does, as a verb.

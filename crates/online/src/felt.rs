@@ -9,6 +9,7 @@ use skinrig_model::{
 
 use crate::detector::{Detection, Felt};
 use crate::score::{DetectionScore, ScoredPress};
+use crate::tip::{TipCourse, TipCourses};
 
 const fn region(region: TouchRegion) -> Region {
     Region {
@@ -99,18 +100,29 @@ impl<'a> Sensed<'a> {
         self.positions.iter().filter_map(inside).collect()
     }
 
+    /// Error of each depth and how far its interval reaches to each side, mm.
+    fn depths(&self, tip: &TipCourse) -> Vec<(f64, f64)> {
+        let depth = |t: &&TouchEstimate| {
+            let depth = t.depth?;
+            let error_mm = depth.mm - tip.reached_mm(us(t.until))?;
+            Some((error_mm.abs(), depth.within_mm))
+        };
+        self.positions.iter().filter_map(depth).collect()
+    }
+
     fn last(&self) -> Option<&TouchEstimate> {
         let located = self.positions.iter().rfind(|t| t.at_mm.is_some());
         located.copied()
     }
 }
 
-/// Compares `touches`, in the order of the record, with the analysis of the session, of which `outcome` gives the last attempts; `None`
-/// if nothing was ever felt in it. Nothing is felt from `resumed` on, the start of the second leg.
+/// Compares `touches`, in the order of the record, with the analysis of the session, of which `tips` gives the depths of the scored
+/// presses and `outcome` the last attempts; `None` if nothing was ever felt in it. Nothing is felt from `resumed` on, the start of the second leg.
 #[must_use]
 pub fn felt<'o>(
     analysis: &Analysis,
     touches: &[TouchEstimate],
+    tips: &TipCourses,
     resumed: Option<HostTime>,
     outcome: impl Fn(PressId) -> Option<&'o PressOutcome>,
 ) -> Option<FeltTouches> {
@@ -133,6 +145,13 @@ pub fn felt<'o>(
         .filter(|inside| !inside.is_empty())
         .map(|inside| inside.iter().all(|is| *is))
         .collect();
+    let depths = sensed.iter().filter_map(|s| {
+        let all = s.depths(tips.get(&s.press.press)?);
+        (!all.is_empty()).then_some(all)
+    });
+    let depths: Vec<Vec<(f64, f64)>> = depths.collect();
+    let last_depths = || depths.iter().filter_map(|all| all.last());
+    let holds = |all: &&Vec<(f64, f64)>| all.iter().all(|(error, within)| error <= within);
     let last = || sensed.iter().filter_map(|s| Some((s, s.last()?)));
     let distance = |(s, t): (&Sensed<'_>, &TouchEstimate)| {
         let [x, y] = error(s.press, t.at_mm?)?;
@@ -154,6 +173,10 @@ pub fn felt<'o>(
         region_mm: spread(last().filter_map(|(_, t)| Some(t.region?.semi_axes_mm[0]))),
         with_regions: held.len() as u32,
         held: held.iter().filter(|held| **held).count() as u32,
+        depth_error_mm: spread(last_depths().map(|(error, _)| *error)),
+        depth_within_mm: spread(last_depths().map(|(_, within)| *within)),
+        with_depths: depths.len() as u32,
+        depths_held: depths.iter().filter(holds).count() as u32,
         reactions: reactions(analysis, &presses, touches, outcome),
         skipped: touches
             .iter()
@@ -243,6 +266,7 @@ mod tests {
             attempt: Some(attempt(1)),
             at_mm: None,
             region: None,
+            depth: None,
             llr: None,
         };
         let of = |number| reaction_of(&[stopped], Reaction::Stop, attempt(number)).copied();

@@ -15,6 +15,10 @@ use skinrig_model::{
     AnalysisSettings, CameraId, CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH, SkinOutline,
 };
 
+use crate::depth::DepthReached;
+use crate::direction::Agreement;
+use crate::rise::{Count, Excess, RECENT_US, Rise};
+
 /// Newest events of each camera, to which a window can reach back: 2 MiB.
 const HISTORY: usize = 1 << 17;
 /// Events of a window in each camera: 32 MiB.
@@ -36,6 +40,10 @@ pub struct Position {
     pub events: [u32; 2],
     /// Clustered events in the weaker camera.
     pub clustered: u32,
+    /// Depth that the touch has reached; `None` if the calibration presses do not determine it.
+    pub depth: Option<DepthReached>,
+    /// Events of each camera, until the tip rested or turned back.
+    pub(crate) rising: [Count; 2],
     /// False if a window began before the events that are kept, or holds too many: some did not count.
     pub complete: bool,
 }
@@ -47,6 +55,8 @@ pub struct PositionRow {
     pub at_mm: [f64; 2],
     /// 95 % region that holds at every instant of the touch; `None` if the calibration presses do not determine it.
     pub region: Option<Region>,
+    /// Depth that the touch has reached; `None` if the calibration presses do not determine it.
+    pub depth: Option<DepthReached>,
 }
 
 impl Position {
@@ -57,6 +67,7 @@ impl Position {
         Some(PositionRow {
             at_mm: location.at,
             region: self.region,
+            depth: self.depth,
         })
     }
 }
@@ -157,27 +168,48 @@ impl CameraWindow {
         self.events.clear();
     }
 
-    /// Features of the events until `until_us`, and the number of events.
-    fn features(
-        &mut self,
-        settings: &AnalysisSettings,
-        camera: CameraId,
-        until_us: u64,
-    ) -> (CameraFeatures, u32) {
+    /// What the events until `until_us` give.
+    fn seen(&mut self, settings: &AnalysisSettings, camera: CameraId, until_us: u64) -> Seen {
         let Some(from_us) = self.from_us else {
-            return (CameraFeatures::default(), 0);
+            return Seen::default();
         };
         if !self.in_order {
             self.events.sort_unstable();
             self.in_order = true;
         }
+        let before = |us: u64| self.events.partition_point(|e| u64::from(e.t_us()) < us);
         let end = until_us.saturating_sub(from_us);
-        let count = self.events.partition_point(|e| u64::from(e.t_us()) < end);
+        let (count, earlier) = (before(end), before(end.saturating_sub(RECENT_US)));
+        let excess = |events: usize, us: u64| events as f64 - self.background.events_in(us);
+        let recent_us = end.min(RECENT_US);
         let threshold = self.background.core_threshold(settings, camera, end);
-        let events = &self.events[..count];
-        let estimate = self.estimator.estimate(events, 0, threshold);
-        (CameraFeatures::from(&estimate), count as u32)
+        let estimate = self.estimator.estimate(&self.events[..count], 0, threshold);
+        Seen {
+            features: CameraFeatures::from(&estimate),
+            events: count as u32,
+            count: Count {
+                all: count as f64,
+                beyond: excess(count, end),
+            },
+            recent: excess(count - earlier, recent_us),
+            idle: self.background.events_in(recent_us),
+            agreement: Agreement::of(&self.events[..earlier], &self.events[earlier..count]),
+        }
     }
+}
+
+/// What a camera has seen of a touch.
+#[derive(Default)]
+struct Seen {
+    features: CameraFeatures,
+    events: u32,
+    count: Count,
+    /// Recent events beyond the idle rate,
+    recent: f64,
+    /// and those that are expected of an idle skin.
+    idle: f64,
+    /// Of the recent events with those before.
+    agreement: Agreement,
 }
 
 /// Where a window begins in one camera, µs of camera time.
@@ -204,6 +236,7 @@ impl From<Window> for Opening {
 pub struct PositionEstimator {
     settings: AnalysisSettings,
     cameras: [CameraWindow; 2],
+    rise: Rise,
     locator: FittedLocator,
     outline: SkinOutline,
 }
@@ -233,6 +266,7 @@ impl PositionEstimator {
             settings: settings.clone(),
             cameras: CameraId::ALL
                 .map(|camera| CameraWindow::new(settings, &hot[camera.index()], camera)),
+            rise: Rise::default(),
             locator,
             outline,
         }
@@ -246,6 +280,7 @@ impl PositionEstimator {
 
     /// Opens a window; its events and those of its idle time may have been pushed already.
     pub fn open(&mut self, openings: [Opening; 2]) {
+        self.rise = Rise::default();
         for (window, opening) in self.cameras.iter_mut().zip(openings) {
             window.open(opening);
         }
@@ -267,15 +302,26 @@ impl PositionEstimator {
         let settings = &self.settings;
         let seen = CameraId::ALL.map(|camera| {
             let k = camera.index();
-            self.cameras[k].features(settings, camera, until_us[k])
+            self.cameras[k].seen(settings, camera, until_us[k])
         });
-        let (outcome, location) = self.locator.outcome(&self.outline, seen.map(|s| s.0));
+        let [one, two] = &seen;
+        self.rise.add(Excess {
+            counts: [one.count, two.count],
+            recent: one.recent + two.recent,
+            idle: one.idle + two.idle,
+            reversal: one.agreement.and(two.agreement).reversal(),
+        });
+        let (outcome, location) = self
+            .locator
+            .outcome(&self.outline, [one.features, two.features]);
         Position {
             outcome,
             location,
             region: None,
-            events: seen.map(|s| s.1),
-            clustered: seen[0].0.cluster_events.min(seen[1].0.cluster_events),
+            events: [one.events, two.events],
+            clustered: one.features.cluster_events.min(two.features.cluster_events),
+            depth: None,
+            rising: self.rise.counts(),
             complete: self.cameras.iter().all(|c| c.complete),
         }
     }

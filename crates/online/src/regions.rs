@@ -15,9 +15,14 @@ pub(crate) const REGIONS: usize = 2 * COLUMNS * ROWS;
 
 /// Region of an event; `None` off the sensor. The lowest bit is 1 for ON events.
 pub(crate) fn region(event: &CdEvent) -> Option<usize> {
-    let (column, row) = (usize::from(event.x / SIDE_X), usize::from(event.y / SIDE_Y));
     let on = usize::from(event.polarity == Polarity::On);
-    (column < COLUMNS && row < ROWS).then_some(2 * (row * COLUMNS + column) + on)
+    block(event.x, event.y).map(|block| 2 * block + on)
+}
+
+/// Block of a pixel; `None` off the sensor.
+pub(crate) fn block(x: u16, y: u16) -> Option<usize> {
+    let (column, row) = (usize::from(x / SIDE_X), usize::from(y / SIDE_Y));
+    (column < COLUMNS && row < ROWS).then_some(row * COLUMNS + column)
 }
 
 /// The region of the other polarity.

@@ -1,103 +1,49 @@
 //! Regions that hold at every instant of a touch: how far positions still move until it ends, learnt from calibration presses.
 //!
-//! At an instant, the position that the touch will end with lies within `reach` of the position so far, with probability
-//! [`STAYS`], at all instants together: `reach` is a multiple of the largest distance seen after so many clustered events in the
-//! weaker camera, and the multiple is the conformal quantile, over presses, of the largest ratio that a press has at any instant (Vovk,
-//! Gammerman & Shafer, "Algorithmic Learning in a Random World", 2005, chapter 2; each half of the presses is scored with the
-//! largest distances of the other). Events, not time, tell how far a touch has come: a press that stops early stays uncertain. The
-//! last position lies with probability 0.99 in the 99 % region of its locator. Both together hold with 95 %, whenever one stops.
+//! At an instant, the position that the touch will end with lies within the envelope's distance of the position so far, with probability
+//! [`STAYS`], at all instants together. The last position lies with probability 0.99 in the 99 % region of its locator. Both together
+//! hold with 95 %, whenever one stops.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::result::Region;
 
+use crate::envelope::{Distances, Envelope};
+
 /// Probability that the last position stays within reach at every instant.
 const STAYS: f64 = 0.96;
-/// Steps per doubling of the events.
-const STEPS_PER_OCTAVE: f64 = 4.0;
-/// Smallest of these distances, mm: below what any skin resolves.
-const LEAST_MM: f64 = 0.02;
 
 /// Positions of one calibration press: clustered events in the weaker camera, and position, mm; in order of time.
 pub(crate) type Course = Vec<(u32, [f64; 2])>;
 
 /// How far positions still move.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Settling {
-    /// Largest distance to the last position by step of events, mm; falls with them.
-    largest_mm: Vec<f64>,
-    /// Multiple of it that holds at all instants.
-    multiple: f64,
-}
+pub(crate) struct Settling(Envelope);
 
-fn step(events: u32) -> usize {
-    (STEPS_PER_OCTAVE * libm::log2(f64::from(events) + 1.0)) as usize
-}
-
-/// Distance to the last position at each instant, by step of events.
-fn distances(course: &Course) -> Vec<(usize, f64)> {
+/// Distance to the last position at each instant.
+fn distances(course: &Course) -> Distances {
     let Some((_, last)) = course.last() else {
         return Vec::new();
     };
     let distance = |at: [f64; 2]| libm::hypot(at[0] - last[0], at[1] - last[1]);
     course
         .iter()
-        .map(|(events, at)| (step(*events), distance(*at)))
+        .map(|(events, at)| (*events, distance(*at)))
         .collect()
-}
-
-/// Largest distance of these presses in each step; none without presses.
-fn largest(presses: &[&Vec<(usize, f64)>]) -> Vec<f64> {
-    let steps = presses.iter().flat_map(|p| p.iter()).map(|(s, _)| s + 1);
-    let mut largest: Vec<f64> = Vec::new();
-    for at in 0..steps.max().unwrap_or(0) {
-        let here = presses.iter().flat_map(|p| p.iter());
-        let here = here.filter(|(step, _)| *step == at).map(|(_, d)| *d);
-        largest.push(here.fold(LEAST_MM, f64::max));
-    }
-    // More events are no less certain; a step that was not seen counts as the one with more.
-    for at in (1..largest.len()).rev() {
-        largest[at - 1] = largest[at - 1].max(largest[at]);
-    }
-    largest
-}
-
-fn at_step(largest: &[f64], step: usize) -> f64 {
-    largest
-        .get(step)
-        .or(largest.last())
-        .copied()
-        .unwrap_or(f64::INFINITY)
 }
 
 impl Settling {
     /// From the positions of calibration presses; `None` if they are too few for this probability.
     pub(crate) fn learn(courses: &[Course]) -> Option<Self> {
-        let presses: Vec<_> = courses.iter().map(distances).collect();
-        let presses: Vec<_> = presses.into_iter().filter(|p| !p.is_empty()).collect();
-        let half = |odd: usize| -> Vec<&Vec<(usize, f64)>> {
-            presses.iter().skip(odd).step_by(2).collect()
-        };
-        let mut ratios = Vec::new();
-        for odd in [0, 1] {
-            let of_others = largest(&half(1 - odd));
-            for press in half(odd) {
-                let ratio = |(step, distance): &(usize, f64)| distance / at_step(&of_others, *step);
-                ratios.push(press.iter().map(ratio).fold(0.0, f64::max));
-            }
-        }
-        ratios.sort_by(f64::total_cmp);
-        let rank = ((presses.len() as f64 + 1.0) * STAYS).ceil() as usize;
-        Some(Self {
-            multiple: *ratios.get(rank.checked_sub(1)?)?,
-            largest_mm: largest(&presses.iter().collect::<Vec<_>>()),
-        })
+        let presses = courses.iter().map(distances);
+        let presses: Vec<_> = presses.filter(|p| !p.is_empty()).collect();
+        Envelope::learn(&presses, STAYS).map(Self)
     }
 
     /// Distance from the position after so many events within which the last one of the touch lies, mm.
     fn reach_mm(&self, events: u32) -> f64 {
-        self.multiple * at_step(&self.largest_mm, step(events))
+        self.0.within_mm(events)
     }
 
     /// The region of a position after so many events: an ellipse that holds every point within reach of the region of the last position.
@@ -194,7 +140,7 @@ mod tests {
         ) {
             let (a, b) = if a > b { (a, b) } else { (b, a) };
             let last = Region { semi_axes_mm: [a, b], angle_deg };
-            let settling = Settling { largest_mm: vec![reach], multiple: 1.0 };
+            let settling = Settling(Envelope::of(reach));
             let region = settling.region(last, 0).unwrap();
             let (sin, cos) = libm::sincos(f64::to_radians(angle_deg));
             let (y, x): (f64, f64) = libm::sincos(at);

@@ -5,6 +5,7 @@ use skinrig_analysis::locator::{FittedLocator, LocatorModelError};
 use skinrig_analysis::result::{ClockFit, HotPixels, LocatorResult};
 use skinrig_model::{AnalysisSettings, SkinOutline, StereoGeometry};
 
+use crate::depth::DepthModel;
 use crate::model::TouchModel;
 use crate::position::PositionEstimator;
 use crate::settling::Settling;
@@ -25,6 +26,8 @@ pub struct SkinModel {
     pub(crate) threshold: f64,
     /// How far positions still move; `None` if the presses are too few for regions.
     pub(crate) settling: Option<Settling>,
+    /// How deep touches are; `None` if the depth of the presses was not measured, or they are too few.
+    pub(crate) depths: Option<DepthModel>,
     /// The longest window of a press, µs: later events of a touch do not count for its position, they would add only noise.
     pub(crate) longest_window_us: Option<i64>,
     /// Idle time behind the threshold, s.
@@ -108,6 +111,12 @@ impl SkinModel {
     pub const fn has_regions(&self) -> bool {
         self.settling.is_some()
     }
+
+    /// Whether touches have depths.
+    #[must_use]
+    pub const fn has_depths(&self) -> bool {
+        self.depths.is_some()
+    }
 }
 
 #[cfg(test)]
@@ -124,6 +133,7 @@ impl SkinModel {
             touches,
             threshold,
             settling: None,
+            depths: None,
             longest_window_us: None,
             idle_s: 10.0,
             clocks_at_us: 0.0,

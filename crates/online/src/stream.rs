@@ -7,6 +7,7 @@ use skinrig_analysis::locator::LocatorModelError;
 use skinrig_analysis::segment::{IDLE_US, MIN_IDLE_US};
 use skinrig_model::{CameraId, CdEvent};
 
+use crate::depth::DepthModel;
 use crate::detector::{Detection, Detector, Felt, UnusableClock};
 use crate::position::{Opening, Position, PositionEstimator};
 use crate::settling::Settling;
@@ -66,6 +67,7 @@ pub(crate) struct TouchStream {
     detector: Detector,
     positions: PositionEstimator,
     settling: Option<Settling>,
+    depths: Option<DepthModel>,
     /// Events of each camera that the detector has not taken yet,
     waiting: [VecDeque<CdEvent>; 2],
     /// and time before which it has sent everything, camera µs.
@@ -98,6 +100,7 @@ impl TouchStream {
             detector: Detector::new(&skin.touches, &skin.clocks, skin.threshold, from_us)?,
             positions: skin.positions()?,
             settling: skin.settling.clone(),
+            depths: skin.depths.clone(),
             waiting: Default::default(),
             newest_us: [0; 2],
             before_us: (skin.settings.window_before_ms * 1e3) as i64,
@@ -235,8 +238,11 @@ impl TouchStream {
         let position = self.positions.position(until_us);
         let last = self.positions.last_region(&position);
         let region = |settling: &Settling| settling.region(last?, position.clustered);
+        let located = position.location.filter(|_| position.complete);
+        let depth = |depths: &DepthModel| depths.reached(located?.at, position.rising);
         Position {
             region: self.settling.as_ref().and_then(region),
+            depth: self.depths.as_ref().and_then(depth),
             ..position
         }
     }

@@ -2,7 +2,7 @@
 
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{ClockFit, PressResult};
-use skinrig_model::{AnalysisSettings, CameraId, PressRole, Verdict, WindowAnchor};
+use skinrig_model::{AnalysisSettings, CameraId, PressId, PressRole, Verdict, WindowAnchor};
 
 /// A press without a camera clock or without enough calibration presses to learn from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -39,6 +39,7 @@ const LEAST_PRESSES: usize = 8;
 /// A calibration press. Times: host, µs.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrainingPress {
+    pub press: PressId,
     pub at: [f64; 2],
     pub location: u32,
     pub columns: [Option<f64>; 2],
@@ -61,6 +62,7 @@ fn training_press(row: &PressResult) -> Option<TrainingPress> {
     let (timing, truth) = (row.timing?, row.truth?);
     let us = |t: skinrig_model::HostTime| t.0 as f64 * 1e-3;
     Some(TrainingPress {
+        press: row.press,
         at: [truth.x_mm, truth.y_mm],
         location: row.location.index(),
         columns: [0, 1].map(|k| row.views[k].and_then(|v| v.centroid_u)),

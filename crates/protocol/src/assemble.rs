@@ -216,7 +216,8 @@ fn assemble(
         let places = calibrate_at.as_ref().map_or(locations.len(), Vec::len);
         let calibrating = roles.iter().filter(|r| **r == PressRole::Calibrate).count();
         let presses = places * depths_mm.len() * calibrating;
-        react.can_act(presses, root.at("online.react"), out);
+        let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
+        react.can_act(presses, deepest_mm, root.at("online.react"), out);
     }
     let sync = declared(keys.sync, |keys| sync(&keys, outline, &depths_mm))?;
     let presses = locations.len() as u64 * depths_mm.len() as u64 * roles.len() as u64

@@ -1,7 +1,9 @@
 //! Touch felt while a session is recorded: how, and what presses do then.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{HostDuration, LEAST_PRESSES_OF_REGIONS, PressRole, Reaction};
+use skinrig_model::{
+    HostDuration, LEAST_PRESSES_OF_DEPTHS, LEAST_PRESSES_OF_REGIONS, PressRole, Reaction,
+};
 use skinrig_settings::{Collector, Field, Settings};
 
 /// Feels touches while the session is recorded. The calibrating repetitions teach it; it feels from the first scored press on.
@@ -30,6 +32,9 @@ pub(crate) struct ReactKeys {
     /// Only once the 95 % region of the position reaches no further than this; absent: as soon as a touch is felt.
     #[setting(above = 0.0, max = 100.0)]
     pub region_mm: Option<f64>,
+    /// Only once the touch is felt to be this deep; a press that lifts then does not go on to its own depth.
+    #[setting(above = 0.0, max = 100.0)]
+    pub depth_mm: Option<f64>,
 }
 
 /// How touches are felt while the session is recorded.
@@ -52,21 +57,55 @@ pub struct React {
     /// The longer semi-axis of the position's region is at most this, mm; `None`: a touch is felt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region_mm: Option<f64>,
+    /// The touch is felt to be at least this deep, mm; `None`: at any depth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_mm: Option<f64>,
 }
 
 impl React {
-    /// Reports a region that is never known: so many presses calibrate.
-    pub(crate) fn can_act(&self, calibrating: usize, field: &Field, out: &mut Collector) {
-        if self.region_mm.is_none() || calibrating >= LEAST_PRESSES_OF_REGIONS {
-            return;
+    /// Reports a region or depth that is never known, since so many presses calibrate, and a depth that no press reaches.
+    pub(crate) fn can_act(
+        &self,
+        calibrating: usize,
+        deepest_mm: f64,
+        field: &Field,
+        out: &mut Collector,
+    ) {
+        let teach = [
+            (
+                "region",
+                self.region_mm,
+                LEAST_PRESSES_OF_REGIONS,
+                "how far a position may be off",
+            ),
+            (
+                "depth",
+                self.depth_mm,
+                LEAST_PRESSES_OF_DEPTHS,
+                "how deep a touch is",
+            ),
+        ];
+        for (key, wanted, least, what) in teach {
+            if wanted.is_none() || calibrating >= least {
+                continue;
+            }
+            let at = field.at(key);
+            out.error(at.span, at.path.as_str(), "no press would react")
+                .expected(format!(
+                    "at least {least} calibration presses, which teach {what}"
+                ))
+                .found(calibrating.to_string())
+                .help(format!("calibrate with more repetitions or locations, or remove `{key}`: presses then react as soon as they are felt"));
         }
-        let at = field.at("region");
-        out.error(at.span, at.path.as_str(), "no press would react")
-            .expected(format!(
-                "at least {LEAST_PRESSES_OF_REGIONS} calibration presses, which teach how far a position may be off"
-            ))
-            .found(calibrating.to_string())
-            .help("calibrate with more repetitions or locations, or remove `region`: presses then react as soon as they are felt");
+        if let Some(depth_mm) = self.depth_mm.filter(|mm| *mm >= deepest_mm) {
+            let at = field.at("depth");
+            out.error(at.span, at.path.as_str(), "no press would react")
+                .expected(format!(
+                    "less than the depth of the presses, {deepest_mm} mm: they never go deeper than planned"
+                ))
+                .found(format!("{depth_mm} mm"))
+                .help("press deeper, or state a smaller depth");
+        }
     }
 }
 
@@ -92,6 +131,7 @@ impl OnlineKeys {
                     react: self.react.as_ref().map(|react| React {
                         then: react.then,
                         region_mm: react.region_mm,
+                        depth_mm: react.depth_mm,
                     }),
                 });
             }

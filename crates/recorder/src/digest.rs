@@ -148,7 +148,19 @@ const TABLES: [Table; 23] = [
         12,
         "SELECT * FROM notification ORDER BY id LIMIT ?1",
     ),
-    table("touch", 13, "SELECT * FROM touch ORDER BY id LIMIT ?1"),
+    Table {
+        name: "touch",
+        since: 13,
+        rows: "SELECT * FROM touch ORDER BY id LIMIT ?1",
+        earlier: &[
+            (
+                13,
+                "SELECT id, t_ns, until_ns, until_sd_ns, kind, press, attempt, x_mm, y_mm, major_mm, minor_mm, angle_deg, llr
+                 FROM touch ORDER BY id LIMIT ?1",
+            ),
+            (14, "SELECT * FROM touch ORDER BY id LIMIT ?1"),
+        ],
+    },
     Table {
         name: "run_end",
         since: 1,

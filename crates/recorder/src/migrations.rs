@@ -6,7 +6,7 @@ use sqlx::SqlSafeStr;
 use sqlx::migrate::{Migration, MigrationType, Migrator};
 
 /// Schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub(crate) const SCHEMA_VERSION: u32 = 13;
+pub(crate) const SCHEMA_VERSION: u32 = 14;
 
 /// All migrations, oldest first: version, description and SQL. Listed by hand, because the macro that reads the folder would
 /// build SQLite a second time for the compiler.
@@ -75,6 +75,11 @@ const MIGRATIONS: [(i64, &str, &str); SCHEMA_VERSION as usize] = [
         20261127090000,
         "touch",
         include_str!("../../../migrations/20261127090000_touch.sql"),
+    ),
+    (
+        20261130180000,
+        "depth",
+        include_str!("../../../migrations/20261130180000_depth.sql"),
     ),
 ];
 

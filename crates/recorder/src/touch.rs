@@ -1,6 +1,9 @@
 //! Rows of table `touch`: touches felt while the session was recorded.
 
-use skinrig_model::{AttemptId, HostTime, PressId, TouchEstimate, TouchKind, TouchRegion};
+use skinrig_model::{
+    AttemptId, HostTime, PressId, TouchDepth, TouchEstimate, TouchKind, TouchRegion,
+};
+use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 use crate::query::{Fault, enum_value, int, opt_num, opt_real};
@@ -18,13 +21,15 @@ pub(crate) async fn insert(
         region.map(|r| r.semi_axes_mm[1]),
         region.map(|r| r.angle_deg),
         estimate.llr,
+        estimate.depth.map(|d| d.mm),
+        estimate.depth.map(|d| d.within_mm),
     ];
     if let Some(bad) = numbers.iter().flatten().find(|v| !v.is_finite()) {
         return Err(Fault::bad("a touch", "finite values", bad));
     }
     sqlx::query(
-        "INSERT INTO touch (t_ns, until_ns, until_sd_ns, kind, press, attempt, x_mm, y_mm, major_mm, minor_mm, angle_deg, llr)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO touch (t_ns, until_ns, until_sd_ns, kind, press, attempt, x_mm, y_mm, major_mm, minor_mm, angle_deg, llr,
+         depth_mm, depth_within_mm) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(estimate.t.0)
     .bind(estimate.until.0)
@@ -38,9 +43,21 @@ pub(crate) async fn insert(
     .bind(numbers[3])
     .bind(numbers[4])
     .bind(numbers[5])
+    .bind(numbers[6])
+    .bind(numbers[7])
     .execute(conn)
     .await?;
     Ok(())
+}
+
+/// Depth in a row; schema 13 has none.
+fn depth(row: &SqliteRow) -> Result<Option<TouchDepth>, Fault> {
+    let value = |column: &str| match row.try_get(column) {
+        Err(sqlx::Error::ColumnNotFound(_)) => Ok(None),
+        found => found.map_err(Fault::from),
+    };
+    let depth = value("depth_mm")?.zip(value("depth_within_mm")?);
+    Ok(depth.map(|(mm, within_mm)| TouchDepth { mm, within_mm }))
 }
 
 /// The estimate of a row.
@@ -64,6 +81,7 @@ pub(crate) fn from_row(row: &SqliteRow) -> Result<TouchEstimate, Fault> {
             semi_axes_mm: [major, minor],
             angle_deg,
         }),
+        depth: depth(row)?,
         llr: opt_real(row, "llr")?,
     })
 }

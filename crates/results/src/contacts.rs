@@ -2,6 +2,7 @@
 
 use skinrig_analysis::Descent;
 use skinrig_model::{HostDuration, HostTime, PlannedPress, PoseSample, PressOutcome, PressRole};
+use skinrig_online::{TipCourse, TipCourses};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 /// Maximum number of contacts to examine, evenly spread.
@@ -68,6 +69,32 @@ pub(crate) fn descents(
         found[*row] = Some(descent(&poses));
     }
     Ok(found)
+}
+
+/// The way of the tip during every press of these roles whose depth was measured.
+///
+/// # Errors
+/// When the poses cannot be read.
+pub(crate) fn tip_courses(
+    reader: &SessionReader,
+    planned: &[PlannedPress],
+    outcomes: &[Option<PressOutcome>],
+    scored: bool,
+) -> Result<TipCourses, RecorderError> {
+    let mut courses = TipCourses::new();
+    for (press, outcome) in planned.iter().zip(outcomes) {
+        let measured = outcome.as_ref().filter(|o| !o.scheduled);
+        let wanted = measured.filter(|_| (press.role == PressRole::Score) == scored);
+        let Some((outcome, timing)) = wanted.and_then(|o| Some((o, o.timing?))) else {
+            continue;
+        };
+        let surface_mm = outcome.touched_mm.unwrap_or(0.0);
+        let side = HostDuration::from_millis(SIDE_MS);
+        let poses = reader.poses(timing.contact - side, timing.retract)?;
+        let depth = |p: &PoseSample| (p.t.0 as f64 * 1e-3, surface_mm - p.measured.z_mm);
+        courses.insert(press.id, TipCourse::new(poses.iter().map(depth)));
+    }
+    Ok(courses)
 }
 
 /// Mean force during the hold of each press, N; empty if the planned depths are all the same, `None` for a press without

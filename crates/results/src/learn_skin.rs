@@ -27,6 +27,7 @@ pub fn learn_skin(path: &Path, false_alarms_hz: f64) -> Result<SkinModel, Result
     let aligned = Session::open(path, AnalysisOptions::default())?
         .read_input()?
         .align();
-    let skin = SkinModel::learn(&analyzed.analysis, &aligned.events, false_alarms_hz);
+    let tips = aligned.tip_courses(false)?;
+    let skin = SkinModel::learn(&analyzed.analysis, &aligned.events, &tips, false_alarms_hz);
     Ok(skin.map_err(NotLearnt::Presses)?)
 }

@@ -13,10 +13,12 @@ use skinrig_model::{
     AttemptId, HostTime, PressId, PressOutcome, PressRole, Reaction, StopMetric, TouchEstimate,
     Verdict,
 };
+use skinrig_online::TipCourses;
 use skinrig_protocol::Online;
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::campaign;
+use crate::contacts;
 use crate::earlier;
 use crate::error::ResultsError;
 use crate::events::SessionEvents;
@@ -81,6 +83,15 @@ impl RecordedSession {
 }
 
 impl AlignedSession {
+    /// The way of the tip during every press whose depth was measured: of the scored presses, or of the others.
+    ///
+    /// # Errors
+    /// When the poses cannot be read.
+    pub fn tip_courses(&self, scored: bool) -> Result<TipCourses, RecorderError> {
+        let (planned, outcomes) = (&self.input.planned, &self.input.outcomes);
+        contacts::tip_courses(&self.session.reader, planned, outcomes, scored)
+    }
+
     /// Runs the complete analysis.
     ///
     /// # Errors
@@ -102,12 +113,17 @@ impl AlignedSession {
         let reference = wants_reference.then(|| reference_code(&self.input, &analysis, &kept));
         let motion = motion(&self.session.reader, &analysis)?;
         let touches = self.session.reader.touches()?;
+        let tips = if touches.is_empty() {
+            TipCourses::new()
+        } else {
+            self.tip_courses(true)?
+        };
         let rows = self.input.planned.iter().zip(&self.input.outcomes);
         let outcomes: BTreeMap<PressId, &PressOutcome> = rows
             .filter_map(|(press, outcome)| Some((press.id, outcome.as_ref()?)))
             .collect();
         let resumed = self.input.legs.first().map(|leg| leg.origin);
-        let felt = skinrig_online::felt(&analysis, &touches, resumed, |press| {
+        let felt = skinrig_online::felt(&analysis, &touches, &tips, resumed, |press| {
             outcomes.get(&press).copied()
         });
         let end = self.session.reader.end()?.map(|(_, end)| end);

@@ -16,7 +16,8 @@ const ask = (about, name, said) => !about.control ? [] : [
 const feeling = t => [`felt: ${t.felt} of ${t.presses} scored presses, ${t.between} touch${t.between === 1 ? '' : 'es'} between presses`,
   t.skipped && `skipped bytes ${t.skipped} times to keep up`,
   !t.touching ? 'not touched now' : ['touched now', t.at_mm && `at (${t.at_mm.map(v => number(v, 1)).join(', ')}) mm`,
-    t.region && `95 % region ${t.region.semi_axes_mm.map(v => number(v, 1)).join(' x ')} mm (semi-axes)`].filter(Boolean).join(', '),
+    t.region && `95 % region ${t.region.semi_axes_mm.map(v => number(v, 1)).join(' x ')} mm (semi-axes)`,
+    t.depth && `${number(t.depth.mm, 1)} ± ${number(t.depth.within_mm, 1)} mm deep`].filter(Boolean).join(', '),
 ].filter(Boolean).join('; ');
 // A mark in the browser's own timeline: the pictures taken then are on the screen now.
 const shown = all => {

@@ -10,7 +10,7 @@ const REACTIONS = ['stopped', 'lifted'];
 // What the run felt at a time: the newest estimate of a touch that has not ended by then.
 export const feltAt = (touches, t) => {
   const last = touches.findLast(row => row[0] <= t && !REACTIONS.includes(row[1]));
-  return ['onset', 'position'].includes(last?.[1]) ? { at_mm: last[2], region: last[3] } : null;
+  return ['onset', 'position'].includes(last?.[1]) ? { at_mm: last[2], region: last[3], depth: last[4] } : null;
 };
 export const summary = a => !a ? 'not analysed: `skinrig analyze` measures the errors' : a.valid
   ? `${a.calibrated ? 'RMSE' : 'residual against the nominal geometry'} ${number(a.rmse_mm[0])} mm (${number(a.rmse_mm[1])} to ${number(a.rmse_mm[2])}), n = ${a.n}; clock certificate: ${a.certificate.status}`
@@ -65,7 +65,7 @@ export const player = async (named, on, signal) => {
       [whole, strip].forEach(line => line.at(t));
       const mark = s.marks.findLast(m => m[0] <= t && m[0] > t - Math.max(MARK_S, accumulation_s));
       said.textContent = `${number(t, 3)} s: ${counts[0]} and ${counts[1]} events; tip ${tip ? height(tip[3]) : 'unknown'}`
-        + (touch ? '; a touch is felt' : '')
+        + (touch ? '; a touch is felt' + (touch.depth ? `, ${number(touch.depth.mm, 1)} ± ${number(touch.depth.within_mm, 1)} mm deep` : '') : '')
         + (mark ? `; clock mark: ${mark[1].replaceAll('_', ' ')}, press ${mark[2]}` : '')
         + (s.clocks_measured.every(Boolean) ? '' : '; camera times from arrivals, good to milliseconds');
       shown = { t_s: t, press: inPress ? chosen.press : null, events: counts, tip_mm: tip?.slice(1, 4) ?? null };

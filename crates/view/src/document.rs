@@ -66,7 +66,7 @@ pub(crate) fn document(lab: &dyn Lab, opened: &OpenSession) -> Result<Value, Pro
         "clocks_measured": known.clocks.each_ref().map(|c| c.as_ref().is_some_and(|c| c.is_measured())),
         "presses": presses(&known.presses, analysis, geometry),
         "marks": marks.map(|m| json!([m.t.as_secs_f64(), m.mark.kind.name(), m.mark.press.number()])).collect::<Vec<_>>(),
-        "touches": touches.map(|t| json!([t.t.as_secs_f64(), t.kind, t.at_mm, t.region])).collect::<Vec<_>>(),
+        "touches": touches.map(|t| json!([t.t.as_secs_f64(), t.kind, t.at_mm, t.region, t.depth])).collect::<Vec<_>>(),
         "notes": notes.map(|n| json!([n.t.as_secs_f64(), n.text])).collect::<Vec<_>>(),
         "interruptions": interruptions.map(|i| json!([i.t.as_secs_f64(), i.kind.name(), i.reason.to_string()])).collect::<Vec<_>>(),
         "devices": devices.collect::<Vec<_>>(),

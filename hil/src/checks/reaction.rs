@@ -106,6 +106,10 @@ mod tests {
             region_mm: Spread::default(),
             with_regions: 0,
             held: 0,
+            depth_error_mm: Spread::default(),
+            depth_within_mm: Spread::default(),
+            with_depths: 0,
+            depths_held: 0,
             reactions,
             skipped: 1,
         }

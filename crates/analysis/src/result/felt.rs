@@ -45,6 +45,14 @@ pub struct FeltTouches {
     pub with_regions: u32,
     /// and those whose regions hold the measured position at every instant (at least 95 % are stated).
     pub held: u32,
+    /// Error of the last depth before each release, mm,
+    pub depth_error_mm: Spread,
+    /// and how far its interval reaches to each side, mm.
+    pub depth_within_mm: Spread,
+    /// Touches with depths,
+    pub with_depths: u32,
+    /// and those whose intervals hold the measured depth at every instant (95 % are stated).
+    pub depths_held: u32,
     /// How presses reacted; `None` if none did.
     pub reactions: Option<FeltReactions>,
     /// Times at which bytes were skipped because the estimator could not keep up.

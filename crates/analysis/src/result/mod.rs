@@ -86,8 +86,8 @@ use crate::rule::Rule;
 /// errors of its own. Version 19: a place that a plan lists again is one location. Version
 /// 20: a look needs half of the presses, and an open question is a warning. Version 24: the window of a long hold ends 1 s after the depth was
 /// reached. Version 29: positions in another scale are also found about their middle, and unused settings are named. Version 30: so are
-/// lists of presses in any other order.
-pub const ANALYSIS_VERSION: u32 = 30;
+/// lists of presses in any other order. Version 31: touches felt while recording have depths.
+pub const ANALYSIS_VERSION: u32 = 31;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -86,7 +86,8 @@ fn learn(
     false_alarms: f64,
 ) -> Result<SkinModel, Failure> {
     let _phase = Phase::reading("learning", aligned.events.bytes_read());
-    SkinModel::learn(analysis, &aligned.events, false_alarms).map_err(|e| taught(e, session))
+    let tips = aligned.tip_courses(false).map_err(Failure::session)?;
+    SkinModel::learn(analysis, &aligned.events, &tips, false_alarms).map_err(|e| taught(e, session))
 }
 
 /// Waits until the session time that has passed since `start` is due.
@@ -203,19 +204,17 @@ fn print(skin: &SkinModel, stop: StopRule, felts: &Felts, replay: &Replay, rig: 
         skin.threshold(),
         skin.idle_s()
     );
+    let outside = match felts.outside {
+        0 => String::new(),
+        more => format!("; {more} more after the end of a camera's data"),
+    };
     outln!(
-        "felt      {} of {} scored presses; {} missed, {} during a false alarm",
+        "felt      {} of {} scored presses; {} missed, {} during a false alarm{outside}",
         felts.felt,
         felts.presses,
         felts.missed,
         felts.alarmed
     );
-    if felts.outside > 0 {
-        outln!(
-            "outside   {} more after the end of a camera's data",
-            felts.outside
-        );
-    }
     let (delay, release) = (felts.delay_ms, felts.release_ms);
     let depth = felts.depth_mm;
     let depth = match depth.n {
@@ -263,6 +262,20 @@ fn print(skin: &SkinModel, stop: StopRule, felts: &Felts, replay: &Replay, rig: 
         outln!("regions   hold at every instant in {held} of {touches} touches (95 % stated)");
     } else {
         outln!("regions   none: the calibration presses are too few");
+    }
+    let reached = &felts.reached;
+    let (touches, held) = reached.held;
+    if touches > 0 {
+        outln!(
+            "depth     error median {} mm, p99 {} mm before the release; the interval, then within {} mm, holds at every instant in {held} of {touches}",
+            number(reached.error_mm.median, 2),
+            number(reached.error_mm.p99, 2),
+            number(reached.within_mm.median, 2)
+        );
+    } else {
+        outln!(
+            "depth     unknown: that of the calibration presses was not measured, or they are too few"
+        );
     }
     outln!(
         "offline   {} of {} press windows give the bits of the analysis",
@@ -373,8 +386,10 @@ pub(crate) fn online(args: &OnlineArgs, output: Output) -> Outcome {
     let skin = learn(&target.path, &aligned, &analysis, args.false_alarms)?;
     let both = (&analysis, &aligned.input);
     let replay = replay(args, &reader, both, header.stream_formats, &skin, output)?;
+    let tips = aligned.tip_courses(true).map_err(Failure::session)?;
     let felts = Felts::new(
         &analysis,
+        &tips,
         &replay.found,
         &replay.sightings,
         args.stop_at,

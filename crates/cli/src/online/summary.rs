@@ -3,7 +3,7 @@
 use serde::Serialize;
 use skinrig_analysis::Analysis;
 use skinrig_analysis::metrics::quantile;
-use skinrig_online::{Detection, DetectionScore, Felt, Position, ScoredPress};
+use skinrig_online::{Detection, DetectionScore, Felt, Position, ScoredPress, TipCourses};
 use skinrig_recorder::RecorderError;
 
 use crate::args::StopRule;
@@ -66,6 +66,17 @@ pub(super) struct At {
     pub(super) inside: Option<f64>,
 }
 
+/// Depths of the scored presses, while they were felt.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Reached {
+    /// Error of the last depth before the release, mm,
+    pub(super) error_mm: Quantiles,
+    /// and how far its interval reaches to each side, mm.
+    pub(super) within_mm: Quantiles,
+    /// Touches with depths, and those whose intervals hold the measured depth at every instant.
+    pub(super) held: (usize, usize),
+}
+
 /// Result of a replay.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Felts {
@@ -88,11 +99,13 @@ pub(super) struct Felts {
     pub(super) at_end: At,
     /// Touches with regions, and those whose regions hold the truth at every instant.
     pub(super) held: (usize, usize),
+    pub(super) reached: Reached,
 }
 
 impl Felts {
     pub(super) fn new(
         analysis: &Analysis,
+        tips: &TipCourses,
         found: &[Detection],
         sightings: &[Sighting],
         stop: StopRule,
@@ -142,6 +155,7 @@ impl Felts {
             at_stop: at(analysis, &seen, first),
             at_end: at(analysis, &seen, last),
             held: held(analysis, &seen),
+            reached: reached(analysis, tips, &seen),
         })
     }
 }
@@ -159,6 +173,32 @@ fn held(analysis: &Analysis, seen: &[(usize, Vec<Sighting>)]) -> (usize, usize) 
     });
     let all: Vec<bool> = all.flatten().collect();
     (all.len(), all.iter().filter(|held| **held).count())
+}
+
+fn reached(analysis: &Analysis, tips: &TipCourses, seen: &[(usize, Vec<Sighting>)]) -> Reached {
+    let (mut errors, mut within) = (Vec::new(), Vec::new());
+    let mut held = (0, 0);
+    for (row, sightings) in seen {
+        let tip = tips.get(&analysis.presses[*row].press);
+        let error = |s: &Sighting| {
+            let depth = s.position.depth?;
+            let error_mm = depth.mm - tip?.reached_mm(s.host_us as f64)?;
+            Some((error_mm.abs(), depth.within_mm))
+        };
+        let all: Vec<(f64, f64)> = sightings.iter().filter_map(error).collect();
+        let Some((last, reach)) = all.last() else {
+            continue;
+        };
+        errors.push(*last);
+        within.push(*reach);
+        held.0 += 1;
+        held.1 += usize::from(all.iter().all(|(error, reach)| error <= reach));
+    }
+    Reached {
+        error_mm: Quantiles::of(errors),
+        within_mm: Quantiles::of(within),
+        held,
+    }
 }
 
 fn at(

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{TouchEstimate, TouchKind, TouchRegion};
+use skinrig_model::{TouchDepth, TouchEstimate, TouchKind, TouchRegion};
 
 /// Programs that may follow at once: each has a thread.
 pub(super) const MOST_FOLLOWERS: usize = 32;
@@ -28,6 +28,8 @@ pub(crate) struct TouchLine {
     pub at_mm: Option<[f64; 2]>,
     /// Its 95 % region.
     pub region: Option<TouchRegion>,
+    /// Depth that the touch has reached.
+    pub depth: Option<TouchDepth>,
     /// Log likelihood ratio of an onset against the background, nats.
     pub llr: Option<f64>,
     /// Touches before this one that did not fit into the queue of this program.
@@ -44,6 +46,7 @@ impl TouchLine {
             press: touch.attempt.map(|attempt| attempt.press.number()),
             at_mm: touch.at_mm,
             region: touch.region,
+            depth: touch.depth,
             llr: touch.llr,
             missed,
         }
@@ -133,6 +136,7 @@ mod tests {
             attempt: None,
             at_mm: Some([1.0, 2.0]),
             region: None,
+            depth: None,
             llr: Some(12.5),
         }
     }

@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use skinrig_controller::{Progress, State, TouchProgress};
-use skinrig_model::{CameraId, TouchKind, TouchRegion};
+use skinrig_model::{CameraId, TouchDepth, TouchKind, TouchRegion};
 
 use super::newest::CameraTail;
 use super::touches::TouchLine;
@@ -174,6 +174,8 @@ pub(crate) struct LiveTouch {
     pub at_mm: Option<[f64; 2]>,
     /// Its 95 % region.
     pub region: Option<TouchRegion>,
+    /// Depth that the touch has reached.
+    pub depth: Option<TouchDepth>,
     /// Attempts at scored presses since the run feels touches.
     pub presses: usize,
     /// How many of them were felt.
@@ -194,6 +196,7 @@ impl LiveTouch {
             lag_ms: (latest.t - latest.until).as_secs_f64() * 1e3,
             at_mm: latest.at_mm,
             region: latest.region,
+            depth: latest.depth,
             presses: touch.presses,
             felt: touch.felt,
             between: touch.between,

@@ -192,7 +192,8 @@ fn of_run(live: &RunSnapshot, canvas: Canvas) -> Vec<String> {
     lines
 }
 
-/// `12 of 14 scored presses, 1 touch between presses; touched now, at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm (semi-axes)`
+/// `12 of 14 scored presses, 1 touch between presses; touched now, at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm (semi-axes), 0.8 ± 0.3 mm
+/// deep`
 fn felt(touch: &LiveTouch) -> String {
     let mut text = format!(
         "{} of {} scored presses, {} touch{} between presses",
@@ -212,6 +213,9 @@ fn felt(touch: &LiveTouch) -> String {
     if let Some(region) = touch.region.filter(|_| touch.touching) {
         let [long, short] = region.semi_axes_mm;
         text += &format!(", 95 % region {long:.1} x {short:.1} mm (semi-axes)");
+    }
+    if let Some(depth) = touch.depth.filter(|_| touch.touching) {
+        text += &format!(", {:.1} ± {:.1} mm deep", depth.mm, depth.within_mm);
     }
     text
 }
@@ -307,7 +311,7 @@ fn interruptions(frame: &Frame, canvas: Canvas) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use skinrig_model::{TouchKind, TouchRegion};
+    use skinrig_model::{TouchDepth, TouchKind, TouchRegion};
     use skinrig_text::width;
 
     use super::*;
@@ -338,6 +342,10 @@ mod tests {
                 semi_axes_mm: [3.1, 2.0],
                 angle_deg: 30.0,
             }),
+            depth: Some(TouchDepth {
+                mm: 0.82,
+                within_mm: 0.31,
+            }),
             presses: 14,
             felt: 12,
             between: 1,
@@ -345,7 +353,7 @@ mod tests {
         };
         assert_eq!(
             felt(&touch),
-            "12 of 14 scored presses, 1 touch between presses; touched now, at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm (semi-axes)"
+            "12 of 14 scored presses, 1 touch between presses; touched now, at (8.1, -2.0) mm, 95 % region 3.1 x 2.0 mm (semi-axes), 0.8 ± 0.3 mm deep"
         );
         (touch.touching, touch.between, touch.skipped) = (false, 0, 2);
         assert_eq!(

@@ -139,10 +139,35 @@ fn presses_stop_when_they_are_felt_while_recording() {
     let estimates = |touches: &[TouchEstimate]| -> Vec<_> {
         let parts = touches.iter().filter(|t| t.kind != TouchKind::Started);
         parts
-            .map(|t| (t.kind, t.until, t.at_mm, t.region))
+            .map(|t| (t.kind, t.until, t.at_mm, t.region, t.depth))
             .collect()
     };
     assert!(estimates(&again.touches().unwrap()) == estimates(&touches));
+}
+
+/// Presses that stop at a felt depth are about as deep; the session holds the depths that were felt, and its results judge them.
+#[test]
+fn presses_stop_at_a_depth_that_is_felt() {
+    let lab = Lab::new();
+    let react = "online.react={then: stop, depth: 0.8 mm}";
+    let points = "path.points=[[10 mm, 2 mm], [-10 mm, 18 mm], [0 mm, -18 mm], [25 mm, 17 mm], [5 mm, 20 mm], [-5 mm, -3 mm], [25 mm, -5 mm]]";
+    let session = session_with(&lab, &["--set", points, "--set", react]);
+    let reader = SessionReader::open(&session).unwrap();
+    let touches = reader.touches().unwrap();
+    let stopped = touches.iter().filter(|t| t.kind == TouchKind::Stopped);
+    let felt_mm: Vec<f64> = stopped.map(|t| t.depth.unwrap().mm).collect();
+    assert!(felt_mm.len() >= 7, "{felt_mm:?}");
+    assert!(felt_mm.iter().all(|mm| *mm >= 0.8), "{felt_mm:?}");
+    let results = skinrig(&["--json", "analyze", &session]).code(0).out;
+    let results: Value = serde_json::from_str(&results).unwrap();
+    let felt = &results["analysis"]["felt"];
+    let reached = felt["reactions"]["depth_mm"]["median"].as_f64().unwrap();
+    assert!((0.7..1.2).contains(&reached), "{felt}");
+    let count = |key: &str| felt[key].as_u64().unwrap();
+    assert!(count("with_depths") >= 7, "{felt}");
+    assert!(count("depths_held") + 1 >= count("with_depths"), "{felt}");
+    let off_mm = felt["depth_error_mm"]["median"].as_f64().unwrap();
+    assert!(off_mm < 0.3, "{felt}");
 }
 
 /// The program of `docs/how-to` sends these lines on.

@@ -1,6 +1,7 @@
 //! Touches felt while the run records: feeds the sense, records its answers, and lets a press react to them.
 
 use skinrig_model::{CameraId, HostTime, PressFault, Reaction, Record, RunFault, TouchEstimate};
+use skinrig_protocol::React;
 use skinrig_protocol::plan::{PressStep, Step};
 
 use super::Executor;
@@ -53,14 +54,16 @@ impl Executor<'_> {
                 SenseAnswer::Ready {
                     places,
                     has_regions,
+                    has_depths,
                 } => {
-                    let regions = if has_regions {
-                        ""
-                    } else {
-                        "; positions have no regions: the calibrating presses are too few"
-                    };
-                    let text =
-                        format!("touches are felt from now on, learnt at {places} places{regions}");
+                    let mut text =
+                        format!("touches are felt from now on, learnt at {places} places");
+                    if !has_regions {
+                        text += "; positions have no regions: the calibrating presses are too few";
+                    }
+                    if !has_depths {
+                        text += "; touches have no depths: the depths of the calibrating presses were not measured, or they are too few";
+                    }
                     self.journal.note(t, text)?;
                     self.record_touch(t, SensedTouch::started(t))?;
                 }
@@ -86,6 +89,7 @@ impl Executor<'_> {
             kind,
             at_mm,
             region,
+            depth,
             llr,
         } = touch;
         self.journal.emit(Record::Touch(TouchEstimate {
@@ -96,22 +100,29 @@ impl Executor<'_> {
             attempt,
             at_mm,
             region,
+            depth,
             llr,
         }))
     }
 
-    /// The touch to which the press reacts now with `then`, if it does so and feels one that began after `since`.
-    pub(super) fn reacts(
-        &self,
-        step: &PressStep,
-        then: Reaction,
-        since: HostTime,
-    ) -> Option<SensedTouch> {
-        let react = step.react.filter(|react| react.then == then)?;
+    /// The touch for which the press ends its hold, if it does so and feels one that began after `since`.
+    pub(super) fn lifts(&self, step: &PressStep, since: HostTime) -> Option<SensedTouch> {
+        let react = step.react.filter(|react| react.then == Reaction::Lift)?;
         self.feeling.fulfilled(react, since)
     }
 
-    /// Stops the tip where it is, in contact, because of `touch`: never deeper than planned. Returns the fault if that did not
+    /// The touch to which the press reacts on the way down, if there is one. At a stated depth a press lifts from there, too; otherwise it
+    /// lifts only from its own.
+    pub(super) fn reacts_going_down(
+        &self,
+        step: &PressStep,
+        since: HostTime,
+    ) -> Option<SensedTouch> {
+        let early = |react: &React| react.then == Reaction::Stop || react.depth_mm.is_some();
+        self.feeling.fulfilled(step.react.filter(early)?, since)
+    }
+
+    /// Stops the tip where it is, in contact: never deeper than planned. `touch` is why it holds there. Returns the fault if that did not
     /// happen in time.
     pub(super) fn stop_here(
         &mut self,
@@ -130,8 +141,11 @@ impl Executor<'_> {
             Ok(t) => t,
             Err(off_target) => return Ok(Some(off_target.fault())),
         };
-        let kind = Reaction::Stop.kind();
-        self.record_touch(t, SensedTouch { kind, ..touch })?;
+        // A press that lifts has reacted when it rises.
+        if step.react.is_some_and(|r| r.then == Reaction::Stop) {
+            let kind = Reaction::Stop.kind();
+            self.record_touch(t, SensedTouch { kind, ..touch })?;
+        }
         if let Some(phases) = self.trackers.phases_mut() {
             phases.stop_at(target.z_mm, t);
         }

@@ -1,6 +1,6 @@
 //! Execution of one press: down to the surface, to depth, hold and back up, with all phase times measured.
 
-use skinrig_model::{HostTime, PressFault, Reaction, RunFault};
+use skinrig_model::{HostTime, PressFault, RunFault};
 use skinrig_protocol::Surface;
 use skinrig_protocol::plan::PressStep;
 
@@ -177,7 +177,7 @@ impl Executor<'_> {
         let until = settled.unwrap_or(t) + step.hold;
         while self.now() < until {
             self.tick(Some(until))?;
-            if let Some(touch) = self.reacts(step, Reaction::Lift, t) {
+            if let Some(touch) = self.lifts(step, t) {
                 self.lift_for(touch);
                 break;
             }
@@ -205,7 +205,7 @@ impl Executor<'_> {
                 let late = self.not_arrived("indentation", target, step.deadline);
                 return Ok(Some(PressFault::MotionLate(late)));
             }
-            match self.reacts(step, Reaction::Stop, from) {
+            match self.reacts_going_down(step, from) {
                 Some(touch) if !stopped => {
                     stopped = true;
                     if let Some(fault) = self.stop_here(step, touch, bottom_mm)? {

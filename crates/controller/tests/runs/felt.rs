@@ -26,6 +26,8 @@ struct MockSense {
     world: Shared,
     feels: Feels,
     region_mm: Option<f64>,
+    /// Whether it says how deep the tip is.
+    depths: bool,
     learning: bool,
     touching: bool,
     answered: HostTime,
@@ -35,6 +37,9 @@ impl MockSense {
     fn answer(&mut self, now: HostTime, kind: TouchKind) -> SenseAnswer {
         self.answered = now;
         let region = self.region_mm.filter(|_| kind == TouchKind::Position);
+        let located = self.depths && kind == TouchKind::Position;
+        let mm = -lock(&self.world).tip[2];
+        let within_mm = 0.2;
         SenseAnswer::Felt(SensedTouch {
             until: now,
             until_sd_ns: 0,
@@ -44,6 +49,7 @@ impl MockSense {
                 semi_axes_mm: [mm, mm],
                 angle_deg: 0.0,
             }),
+            depth: located.then_some(TouchDepth { mm, within_mm }),
             llr: None,
         })
     }
@@ -133,16 +139,25 @@ impl Felt {
     }
 }
 
-/// Runs three presses to 2 mm and checks that they are valid and that the robot was never deeper than planned.
-fn run(then: Reaction, region_mm: Option<f64>, feels: Feels, seen_mm: Option<f64>) -> Felt {
+const fn react(then: Reaction) -> React {
+    React {
+        then,
+        region_mm: None,
+        depth_mm: None,
+    }
+}
+
+/// Runs three presses to 2 mm, with a sense that states regions of this size, or depths if `depths`, and checks that they are valid and
+/// that the robot was never deeper than planned.
+fn run_with(react: React, feels: Feels, seen_mm: Option<f64>, depths: bool) -> Felt {
     let world = World::shared(faults(), START);
     let control = lock(&world).control.clone();
-    let react = React { then, region_mm };
     let (plan, mut sink) = (reacting_plan(react), Sink::default());
     let sense = MockSense {
         world: world.clone(),
         feels,
         region_mm: seen_mm,
+        depths,
         learning: false,
         touching: false,
         answered: HostTime::ZERO,
@@ -165,9 +180,20 @@ fn run(then: Reaction, region_mm: Option<f64>, feels: Feels, seen_mm: Option<f64
     }
 }
 
+fn run(then: Reaction, feels: Feels, seen_mm: Option<f64>) -> Felt {
+    run_with(react(then), feels, seen_mm, false)
+}
+
+fn holds_ms(felt: &Felt) -> Vec<i64> {
+    let timings = felt.outcomes().into_iter().filter_map(|o| o.timing);
+    timings
+        .map(|t| (t.retract - t.at_depth).0 / 1_000_000)
+        .collect()
+}
+
 #[test]
 fn a_press_stops_where_it_is_felt_and_holds_there() {
-    let felt = run(Reaction::Stop, None, Feels::Below(0.5), None);
+    let felt = run(Reaction::Stop, Feels::Below(0.5), None);
     for depth_mm in felt.depths_mm() {
         assert!((0.5..0.9).contains(&depth_mm), "{depth_mm}");
     }
@@ -186,20 +212,11 @@ fn a_press_stops_where_it_is_felt_and_holds_there() {
 
 #[test]
 fn a_press_that_is_felt_ends_its_hold() {
-    let held = |felt: &Felt| -> Vec<i64> {
-        let timings = felt.outcomes().into_iter().filter_map(|o| o.timing);
-        timings
-            .map(|t| (t.retract - t.at_depth).0 / 1_000_000)
-            .collect()
-    };
-    let usual = run(Reaction::Lift, None, Feels::Never, None);
-    let felt = run(Reaction::Lift, None, Feels::Below(1.0), None);
-    assert!(
-        held(&usual).iter().all(|ms| *ms >= 30),
-        "{:?}",
-        held(&usual)
-    );
-    assert!(held(&felt).iter().all(|ms| *ms < 20), "{:?}", held(&felt));
+    let usual = run(Reaction::Lift, Feels::Never, None);
+    let felt = run(Reaction::Lift, Feels::Below(1.0), None);
+    let (usually, holds) = (holds_ms(&usual), holds_ms(&felt));
+    assert!(usually.iter().all(|ms| *ms >= 30), "{usually:?}");
+    assert!(holds.iter().all(|ms| *ms < 20), "{holds:?}");
     assert!(felt.depths_mm().iter().all(|mm| (mm - 2.0).abs() < 0.1));
     assert_eq!(felt.touches(TouchKind::Lifted).len(), 3);
     assert_eq!(usual.touches(TouchKind::Lifted), []);
@@ -208,7 +225,11 @@ fn a_press_that_is_felt_ends_its_hold() {
 #[test]
 fn a_reaction_waits_for_a_small_region() {
     for (seen_mm, count) in [(None, 0), (Some(2.5), 0), (Some(1.5), 3)] {
-        let felt = run(Reaction::Stop, Some(2.0), Feels::Below(0.5), seen_mm);
+        let small = React {
+            region_mm: Some(2.0),
+            ..react(Reaction::Stop)
+        };
+        let felt = run_with(small, Feels::Below(0.5), seen_mm, false);
         assert_eq!(felt.touches(TouchKind::Stopped).len(), count, "{seen_mm:?}");
         let full = felt.depths_mm().iter().filter(|mm| **mm > 1.9).count();
         assert_eq!(full, 3 - count);
@@ -216,22 +237,56 @@ fn a_reaction_waits_for_a_small_region() {
 }
 
 #[test]
+fn a_reaction_waits_for_a_depth_and_a_press_lifts_from_it() {
+    for (then, kind) in [
+        (Reaction::Stop, TouchKind::Stopped),
+        (Reaction::Lift, TouchKind::Lifted),
+    ] {
+        let deep = React {
+            depth_mm: Some(1.0),
+            ..react(then)
+        };
+        let felt = run_with(deep, Feels::Below(0.2), None, true);
+        let (depths, holds) = (felt.depths_mm(), holds_ms(&felt));
+        assert!(
+            depths.iter().all(|mm| (1.0..1.4).contains(mm)),
+            "{depths:?}"
+        );
+        assert!(
+            holds
+                .iter()
+                .all(|ms| (*ms < 20) == (then == Reaction::Lift)),
+            "{holds:?}"
+        );
+        let both = [TouchKind::Stopped, TouchKind::Lifted].map(|k| felt.touches(k).len());
+        let expected = [TouchKind::Stopped, TouchKind::Lifted].map(|k| 3 * usize::from(k == kind));
+        assert_eq!(both, expected);
+        let reacted = felt.touches(kind)[0].depth.unwrap();
+        assert!((1.0..1.2).contains(&reacted.mm), "{reacted:?}");
+        // Never said how deep: the press goes on.
+        let blind = run_with(deep, Feels::Below(0.2), None, false);
+        assert!(blind.depths_mm().iter().all(|mm| (mm - 2.0).abs() < 0.1));
+        assert_eq!(blind.touches(kind), []);
+    }
+}
+
+#[test]
 fn a_touch_that_began_before_the_press_is_none_of_it() {
-    let felt = run(Reaction::Stop, None, Feels::Always, Some(0.1));
+    let felt = run(Reaction::Stop, Feels::Always, Some(0.1));
     assert!(felt.depths_mm().iter().all(|mm| (mm - 2.0).abs() < 0.1));
     assert_eq!(felt.touches(TouchKind::Stopped), []);
 }
 
 #[test]
 fn false_alarms_without_end_stop_presses_near_the_surface_and_harm_nothing() {
-    let felt = run(Reaction::Stop, None, Feels::AtEveryPoll, None);
+    let felt = run(Reaction::Stop, Feels::AtEveryPoll, None);
     assert!(felt.depths_mm().iter().all(|mm| (-0.1..0.5).contains(mm)));
     assert_eq!(felt.touches(TouchKind::Stopped).len(), 3);
 }
 
 #[test]
 fn without_a_sense_presses_go_on_as_planned_and_the_session_says_why() {
-    let felt = run(Reaction::Stop, None, Feels::Fails, None);
+    let felt = run(Reaction::Stop, Feels::Fails, None);
     assert!(felt.depths_mm().iter().all(|mm| (mm - 2.0).abs() < 0.1));
     assert!(
         felt.notes().contains(

@@ -39,6 +39,7 @@ fn it_is_learnt_before_the_first_scored_repetition_and_only_scored_presses_react
     let react = React {
         then: Reaction::Lift,
         region_mm: Some(3.0),
+        depth_mm: None,
     };
     use PressRole::{Calibrate, Score, Sync};
     let reacts = vec![(Sync, None), (Calibrate, None), (Score, Some(react))];
@@ -70,6 +71,33 @@ fn a_region_that_is_never_known_is_refused() {
     }
     react("path.meander.columns=6", "then: lift, region: 3 mm").unwrap();
     react("path.meander.columns=5", "then: lift").unwrap();
+}
+
+#[test]
+fn a_depth_that_is_never_felt_is_refused() {
+    let react = |columns: &str, overrides: &[&str]| {
+        let columns = format!("path.meander.columns={columns}");
+        let size = [&[columns.as_str(), "path.meander.rows=3"], overrides].concat();
+        with("online: {react: {then: lift, depth: 1.5 mm}}", &size)
+    };
+    let refused = |found: Result<Protocol, Diagnostics>, parts: [&str; 2]| {
+        let text = found.unwrap_err().to_string();
+        for part in ["online.react.depth", parts[0], parts[1]] {
+            assert!(text.contains(part), "{text}");
+        }
+    };
+    refused(
+        react("6", &[]),
+        ["at least 19 calibration presses", "= found: 18"],
+    );
+    react("7", &[]).unwrap();
+    refused(
+        react("7", &["depth=1.5mm"]),
+        [
+            "less than the depth of the presses, 1.5 mm",
+            "found: 1.5 mm",
+        ],
+    );
 }
 
 #[test]

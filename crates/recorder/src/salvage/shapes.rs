@@ -126,7 +126,7 @@ pub(super) const TABLES: [TableSpec; 23] = [
         ..table(
             "touch",
             13,
-            "INSERT INTO touch VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO touch VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )
     },
     table("table_digest", 3, ""),

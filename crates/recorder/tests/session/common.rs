@@ -264,6 +264,10 @@ pub(crate) fn touches() -> [TouchEstimate; 2] {
             semi_axes_mm: [2.5, 1.0 / 7.0],
             angle_deg: -31.25,
         }),
+        depth: Some(TouchDepth {
+            mm: 1.0 / 9.0,
+            within_mm: 0.25,
+        }),
         llr: Some(12.75),
     };
     let skipped = TouchEstimate {
@@ -271,6 +275,7 @@ pub(crate) fn touches() -> [TouchEstimate; 2] {
         attempt: None,
         at_mm: None,
         region: None,
+        depth: None,
         llr: None,
         ..full
     };

@@ -1,6 +1,6 @@
 //! Round trips of sealed, growing, interrupted and rejected sessions.
 
-use crate::common::{Evt2, header, records, sealed, stopped};
+use crate::common::{Evt2, change, header, records, sealed, stopped, touches};
 use skinrig_model::*;
 use skinrig_recorder::{
     Codec, RecorderError, SessionReader, SessionState, SessionWriter, WriteFailure, list, verify,
@@ -136,7 +136,7 @@ fn all_records_round_trip() {
     assert_eq!(reports.len(), 30);
     assert_eq!(reader.box_reports().unwrap(), reports);
     assert_eq!(reader.notes().unwrap()[0].text, "tip cleaned");
-    assert_eq!(reader.touches().unwrap(), crate::common::touches());
+    assert_eq!(reader.touches().unwrap(), touches());
     assert_eq!(
         reader.notifications().unwrap(),
         crate::common::notifications()
@@ -461,4 +461,29 @@ fn sessions_of_the_first_schema_are_read() {
         (first.measured_depth_mm, first.touched_mm),
         (Some(1.99), None)
     );
+}
+
+#[test]
+fn touches_of_schema_13_have_no_depths() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    let mut writer = SessionWriter::create(&path).unwrap();
+    for record in records(4) {
+        writer.accept(record).unwrap();
+    }
+    drop(writer);
+    change(
+        &path,
+        &[
+            "ALTER TABLE touch DROP COLUMN depth_within_mm",
+            "ALTER TABLE touch DROP COLUMN depth_mm",
+            "PRAGMA user_version = 13",
+        ],
+    );
+    let without = touches().map(|touch| TouchEstimate {
+        depth: None,
+        ..touch
+    });
+    let reader = SessionReader::open(&path).unwrap();
+    assert_eq!(reader.touches().unwrap(), without);
 }

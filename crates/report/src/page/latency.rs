@@ -107,6 +107,14 @@ pub(super) fn felt(a: &Analysis) -> Option<Table> {
     row("last event to estimate (ms)", &f.lag_ms, 1);
     row("error before the release (mm)", &f.error_mm, 2);
     row("longer semi-axis of its region (mm)", &f.region_mm, 2);
+    if f.with_depths > 0 {
+        row(
+            "error of the depth before the release (mm)",
+            &f.depth_error_mm,
+            2,
+        );
+        row("its interval, to each side (mm)", &f.depth_within_mm, 2);
+    }
     if let Some(r) = &f.reactions {
         row("contact to new set point (ms)", &r.reaction_ms, 1);
         row("last event to new set point (ms)", &r.since_event_ms, 1);
@@ -143,10 +151,16 @@ fn felt_notes(f: &FeltTouches) -> Vec<String> {
     } else if f.error_mm.n > 0 {
         notes.push("No regions: the calibration presses are too few.".to_owned());
     }
+    if f.with_depths > 0 {
+        notes.push(format!(
+            "The intervals of the depth hold at every instant in {} of {} touches; 95 % are stated.",
+            f.depths_held, f.with_depths
+        ));
+    }
     if let Some(r) = &f.reactions {
         let what = match r.reaction {
             Reaction::Stop => "stopped where they were",
-            Reaction::Lift => "ended their hold",
+            Reaction::Lift => "lifted",
         };
         let mut text = format!("{} presses {what} when they were felt", r.reaction_ms.n);
         if r.regions.0 > 0 {

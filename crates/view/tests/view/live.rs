@@ -252,6 +252,7 @@ fn a_page_gets_the_touches_that_were_felt() {
             attempt: None,
             at_mm,
             region: None,
+            depth: None,
             llr: None,
         };
         writer.accept(Record::Touch(touch)).unwrap();
@@ -268,8 +269,8 @@ fn a_page_gets_the_touches_that_were_felt() {
     assert_eq!(
         found["touches"],
         json!([
-            [1.5, "onset", [4.0, 5.0], null],
-            [1.75, "release", null, null]
+            [1.5, "onset", [4.0, 5.0], null, null],
+            [1.75, "release", null, null, null]
         ]),
         "{found}"
     );
