@@ -4,9 +4,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use skinrig_controller::{SenseAnswer, SenseFault, SensedTouch, TouchSense};
-use skinrig_model::{
-    CameraId, HostTime, StreamFormat, TouchDepth, TouchEstimate, TouchKind, TouchRegion,
-};
+use skinrig_model::{CameraId, HostTime, StreamFormat, TouchEstimate, TouchKind, TouchRegion};
 use skinrig_online::{Detection, Estimate, Felt, News, Position, SkinModel, Worker};
 use skinrig_protocol::Online;
 
@@ -204,10 +202,7 @@ fn located(host_us: i64, position: &Position, until_sd_ns: i64) -> SensedTouch {
             semi_axes_mm: r.semi_axes_mm,
             angle_deg: r.angle_deg,
         }),
-        depth: position.depth.map(|d| TouchDepth {
-            mm: d.mm,
-            within_mm: d.within_mm,
-        }),
+        depth: position.depth,
         llr: None,
     }
 }

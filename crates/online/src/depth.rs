@@ -5,6 +5,7 @@
 //! as many events are extended by the power law of the second half of their events, and lose weight. The interval holds at every instant of the touch ([`Envelope`]).
 
 use serde::{Deserialize, Serialize};
+use skinrig_model::TouchDepth;
 
 use crate::envelope::{Distances, Envelope, half};
 use crate::rise::Count;
@@ -21,15 +22,6 @@ const EXPONENTS: (f64, f64) = (0.3, 1.2);
 const SCATTER: f64 = 0.2;
 /// Weight, relative to that of the nearest press, below which a press does not count.
 const LEAST_WEIGHT: f64 = 1e-3;
-
-/// Depth that a touch has reached.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct DepthReached {
-    /// mm.
-    pub mm: f64,
-    /// The 95 % interval, which holds at every instant of the touch: as far to both sides, mm, but not below 0.
-    pub within_mm: f64,
-}
 
 /// An instant of a calibration press while the tip goes in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -208,10 +200,10 @@ impl DepthModel {
     }
 
     /// Depth that a touch here has reached with so many events; `None` with more than any calibration press gave.
-    pub(crate) fn reached(&self, at: [f64; 2], counts: [Count; 2]) -> Option<DepthReached> {
+    pub(crate) fn reached(&self, at: [f64; 2], counts: [Count; 2]) -> Option<TouchDepth> {
         let all = total(counts);
         let depth = |()| {
-            Some(DepthReached {
+            Some(TouchDepth {
                 mm: self.courses.depth_mm(at, counts)?,
                 within_mm: self.envelope.within_mm(all),
             })

@@ -36,7 +36,6 @@ mod training;
 mod worker;
 
 pub use clock::SLOT_US;
-pub use depth::DepthReached;
 pub use detector::{Detection, Detector, Felt, UnusableClock};
 pub use felt::felt;
 pub use interleave::interleave;

@@ -12,10 +12,9 @@ use skinrig_analysis::press_events::PackedEvent;
 use skinrig_analysis::result::{HotPixels, LocationOutcome, Region};
 use skinrig_analysis::segment::Window;
 use skinrig_model::{
-    AnalysisSettings, CameraId, CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH, SkinOutline,
+    AnalysisSettings, CameraId, CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH, SkinOutline, TouchDepth,
 };
 
-use crate::depth::DepthReached;
 use crate::direction::Agreement;
 use crate::rise::{Count, Excess, RECENT_US, Rise};
 
@@ -41,7 +40,7 @@ pub struct Position {
     /// Clustered events in the weaker camera.
     pub clustered: u32,
     /// Depth that the touch has reached; `None` if the calibration presses do not determine it.
-    pub depth: Option<DepthReached>,
+    pub depth: Option<TouchDepth>,
     /// Events of each camera, until the tip rested or turned back.
     pub(crate) rising: [Count; 2],
     /// False if a window began before the events that are kept, or holds too many: some did not count.
@@ -56,7 +55,7 @@ pub struct PositionRow {
     /// 95 % region that holds at every instant of the touch; `None` if the calibration presses do not determine it.
     pub region: Option<Region>,
     /// Depth that the touch has reached; `None` if the calibration presses do not determine it.
-    pub depth: Option<DepthReached>,
+    pub depth: Option<TouchDepth>,
 }
 
 impl Position {

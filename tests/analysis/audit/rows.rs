@@ -147,6 +147,30 @@ fn a_press_list_in_a_random_order_within_blocks() {
     }
 }
 
+/// The other rows agree with the cameras, and far more of them than there are wrong ones.
+#[test]
+fn rows_exchanged_here_and_there() {
+    let wishes = SessionOptions {
+        places: 81,
+        ..SessionOptions::default()
+    };
+    for exchanged in [10, 20, 30] {
+        names(Fault::OrderOfPresses, |seed| {
+            let mut random = Random::new(seed + 200);
+            let mut rows: Vec<usize> = (0..81).collect();
+            for i in (1..rows.len()).rev() {
+                rows.swap(i, random.below(i + 1));
+            }
+            rows.truncate(exchanged);
+            let mut order: Vec<usize> = (0..81).collect();
+            for (i, row) in rows.iter().enumerate() {
+                order[*row] = rows[(i + 1) % exchanged];
+            }
+            edit(seed, wishes, |input| reorder(input, 0..81, &|i| order[i]))
+        });
+    }
+}
+
 /// Gives each row in `rows` of every repetition the position of row `from` of it.
 fn reorder(
     input: &mut SessionInput,

@@ -6,6 +6,7 @@
 
 use skinrig_model::{CameraId, Point2};
 
+use super::exchanged::exchanged_rows;
 use super::finding::finding;
 use super::fixed_pixel;
 use super::observed_press::ObservedPress;
@@ -93,7 +94,9 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
     } else {
         2.0 * MIN_GAIN
     };
-    if let Some(found) = permuted_rows(&path, &as_is, least) {
+    let other_order =
+        || permuted_rows(&path, &as_is, least).or_else(|| exchanged_rows(&path, &as_is, least));
+    if let Some(found) = other_order() {
         return vec![rearranged(&path, &found)];
     }
     if !lost.is_empty() {

@@ -12,6 +12,7 @@ mod complete;
 mod drift;
 #[cfg(test)]
 mod even_path;
+mod exchanged;
 mod finding;
 mod fixed_pixel;
 mod follow;

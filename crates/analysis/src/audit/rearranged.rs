@@ -176,16 +176,28 @@ impl Rows {
         all * n.min(MAX_REPETITIONS) / n
     }
 
+    /// Standard deviations of the worse camera between row `i` and the position of row `j`, usually.
+    fn off(&self, i: usize, j: usize) -> f64 {
+        let usual = self
+            .cameras
+            .iter()
+            .filter_map(|views| median(views.iter().filter_map(|v| v.sigmas(i, j)).collect()));
+        usual.fold(0.0, f64::max)
+    }
+
+    /// True if the cameras do not see row `i` at its own position.
+    fn is_off(&self, i: usize) -> bool {
+        self.off(i, i) > ELSEWHERE_SIGMAS
+    }
+
+    /// The rows that the cameras do not see at their own positions.
+    pub(super) fn off_their_place(&self) -> Vec<usize> {
+        (0..self.n).filter(|i| self.is_off(*i)).collect()
+    }
+
     /// True if the cameras see row `i` at row `j` and not at its own position.
     pub(super) fn is_elsewhere(&self, i: usize, j: usize) -> bool {
-        let off = |j| {
-            let usual = self
-                .cameras
-                .iter()
-                .filter_map(|views| median(views.iter().filter_map(|v| v.sigmas(i, j)).collect()));
-            usual.fold(0.0, f64::max)
-        };
-        off(i) > ELSEWHERE_SIGMAS && off(j) < THERE_SIGMAS
+        self.is_off(i) && self.off(i, j) < THERE_SIGMAS
     }
 
     /// The likeliest blocks, if some rows clearly belong elsewhere.

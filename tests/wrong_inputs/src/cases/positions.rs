@@ -224,6 +224,20 @@ pub(super) fn rows(t: &mut Table) {
         right_table,
         &order,
     );
+    t.papers(
+        "ten rows exchanged here and there",
+        |s| {
+            import(s, |b| {
+                let rows = [1, 4, 6, 9, 11, 14, 16, 19, 21, 23];
+                let before = b.table.clone();
+                for (i, row) in rows.iter().enumerate() {
+                    b.table[*row] = before[rows[(i + 1) % rows.len()]];
+                }
+            })
+        },
+        right_table,
+        &order,
+    );
     let shifted = [Named(IndexShifted), Refused];
     t.papers(
         "one row on",
