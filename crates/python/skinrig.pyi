@@ -55,7 +55,10 @@ class Session:
     def variants(self) -> list[str]:
         """Names of the variants of the analysis beside the session."""
     def analysis(self, name: Optional[str] = None) -> dict[str, Any]:
-        """The results that `skinrig analyze` stored beside the session; with a `name` those of a variant."""
+        """The results that `skinrig analyze` stored beside the session; with a `name` those of a variant.
+
+        INVALID ones raise `InvalidSessionWarning`.
+        """
 
 def analyze(
     path: _Path,

@@ -14,6 +14,13 @@ use crate::unused_settings::unused_settings;
 const COMPARABLE: f64 = 0.95;
 /// Fewest presses in a row whose equal positions are suspicious, and fewest groups of equal ones beside them.
 const REPEATED: usize = 3;
+/// Errors beyond this multiple of the median are none of those of the others: of normal errors, one in 10^10 is (Rayleigh: 7 standard
+/// deviations).
+const FAR_OFF: f64 = 6.0;
+/// RMSE, relative to that without such errors, from which they decide it.
+const DECIDES: f64 = 1.25;
+/// Least number of errors of which one stands out.
+const ERRORS: usize = 10;
 /// Share of presses with a dense background that is worth a caveat.
 const MANY: f64 = 0.1;
 
@@ -31,6 +38,9 @@ pub(crate) fn caveats(analysis: &Analysis) -> Vec<Warning> {
     let made = analysis.presses.iter();
     let made = made.filter(|p| p.role != PressRole::Sync);
     let measured: Vec<_> = made.filter_map(|p| Some((p.press, p.truth?))).collect();
+    let scored = analysis.presses.iter().filter(|p| p.is_in_headline());
+    let error = |p: &PressResult| p.error_mm().map(|(x, y)| (p.press, libm::hypot(x, y)));
+    let errors: Vec<_> = scored.filter_map(error).collect();
     let unknown = analysis
         .left_out_rmse()
         .and_then(|rmse| left_out_unknown(&rmse, &measured));
@@ -39,6 +49,7 @@ pub(crate) fn caveats(analysis: &Analysis) -> Vec<Warning> {
         .chain(fewer)
         .chain(storms)
         .chain(repeated_positions(&measured))
+        .chain(few_decide(&errors))
         .chain(unknown)
         .chain(unused_settings(&analysis.settings))
         .collect()
@@ -57,6 +68,30 @@ fn repeated_positions(measured: &[(PressId, Point2)]) -> Option<Warning> {
     let ((first, _), (last, _)) = longest.first().zip(longest.last())?;
     let (first, last) = (*first, *last);
     Some(WarningCause::RepeatedPositions { first, last }.into())
+}
+
+/// A caveat if a few presses, at most a tenth, decide the RMSE: their rows of the press list may be wrong, or their events not theirs.
+fn few_decide(errors: &[(PressId, f64)]) -> Option<Warning> {
+    let mut lengths: Vec<f64> = errors.iter().map(|(_, mm)| *mm).collect();
+    let limit_mm = FAR_OFF * quantile(&mut lengths, 0.5)?;
+    let rmse =
+        |all: &[f64]| libm::sqrt(all.iter().map(|mm| mm * mm).sum::<f64>() / all.len() as f64);
+    lengths.sort_by(f64::total_cmp);
+    let near = lengths.partition_point(|mm| *mm <= limit_mm);
+    let far = errors.iter().filter(|(_, mm)| *mm > limit_mm);
+    let presses: Vec<PressId> = far.map(|(press, _)| *press).collect();
+    let is_few = !presses.is_empty() && 10 * presses.len() <= errors.len();
+    let (rmse_mm, without_mm) = (rmse(&lengths), rmse(&lengths[..near]));
+    let decide = errors.len() >= ERRORS && is_few && rmse_mm > DECIDES * without_mm;
+    decide.then(|| {
+        let cause = WarningCause::FewDecide {
+            presses,
+            limit_mm,
+            rmse_mm,
+            without_mm,
+        };
+        cause.into()
+    })
 }
 
 /// A caveat if the interval of the RMSE where no press calibrated is wider than the area that was pressed.
@@ -243,6 +278,34 @@ mod tests {
             WarningCause::RepeatedPositions { first, last }.into()
         );
         assert!(found.cause.is_grave());
+    }
+
+    #[test]
+    fn presses_far_off_that_decide_the_rmse_are_named() {
+        let say = |mm: &[f64]| {
+            let numbered = (0..).zip(mm).map(|(n, mm)| (PressId::from_index(n), *mm));
+            few_decide(&numbered.collect::<Vec<_>>())
+        };
+        let usual = [
+            1.0, 0.5, 2.0, 1.5, 1.0, 0.8, 1.2, 1.0, 0.9, 1.1, 1.3, 0.7, 1.0,
+        ];
+        assert_eq!(say(&usual), None);
+        let with = |far: &[f64]| [&usual[..], &usual[..], far].concat();
+        let found = say(&with(&[30.0, 1.0, 7.0])).unwrap();
+        let WarningCause::FewDecide {
+            presses, limit_mm, ..
+        } = &found.cause
+        else {
+            panic!("{found}");
+        };
+        assert_eq!(*presses, [26, 28].map(PressId::from_index));
+        assert_eq!(*limit_mm, 6.0);
+        assert!(found.cause.is_grave());
+        // It makes no difference; too many to be few; too few to tell.
+        assert_eq!(say(&[usual.repeat(10), vec![6.1]].concat()), None);
+        assert_eq!(say(&with(&[30.0; 4])), None);
+        assert_eq!(say(&[1.0, 1.0, 1.0, 1.0, 30.0]), None);
+        assert_eq!(say(&[]), None);
     }
 
     #[test]

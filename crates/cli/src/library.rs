@@ -70,6 +70,23 @@ pub fn stored_results(
         .map_err(|e| Failure::internal(format!("{}: cannot read: {e}", path.display())))
 }
 
+/// The refusal of a session's results that are INVALID; `None` for valid ones.
+#[must_use]
+pub fn invalid_results(session: &Path, results: &str) -> Option<Failure> {
+    #[derive(serde::Deserialize)]
+    struct Part {
+        valid: bool,
+    }
+    let is_valid = serde_json::from_str::<Part>(results).is_ok_and(|part| part.valid);
+    (!is_valid).then(|| {
+        Failure::limit(format!(
+            "{}: INVALID, do not use the numbers of these results (`valid` is false)\n  next: `skinrig analyze {}` says what to mend",
+            session.display(),
+            shell_path(session)
+        ))
+    })
+}
+
 /// Names of the variants beside a session.
 #[must_use]
 pub fn variants(session: &Path, session_id: &str) -> Vec<String> {

@@ -1,5 +1,7 @@
 //! Owns the exceptions: the classes, and which failure becomes which.
 
+use std::ffi::{CStr, CString};
+
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
@@ -56,6 +58,16 @@ create_exception!(
     PyUserWarning,
     "The session is INVALID: use none of its numbers."
 );
+
+/// Warns of a session that is INVALID.
+pub(crate) fn warn_invalid(py: Python<'_>, why: &CStr) -> PyResult<()> {
+    PyErr::warn(py, &py.get_type::<InvalidSessionWarning>(), why, 1)
+}
+
+/// The warning's text for a refusal.
+pub(crate) fn why_invalid(refusal: Failure) -> Option<CString> {
+    CString::new(without_styles(&refusal.message)).ok()
+}
 
 /// The exception for a failure.
 pub(crate) fn raised(failure: Failure) -> PyErr {

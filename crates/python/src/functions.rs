@@ -12,7 +12,7 @@ use skinrig::exit::Failure;
 use skinrig::library::{self, CompareOptions, ControlHandle, ProtocolSource, Simulation};
 
 use crate::error::raised;
-use crate::options::{overrides, to_python};
+use crate::options::{overrides, results_to_python, to_python};
 
 /// Python hears of ctrl-C this often during a simulation.
 const LISTEN_EVERY: Duration = Duration::from_millis(100);
@@ -21,7 +21,8 @@ const LISTEN_EVERY: Duration = Duration::from_millis(100);
 ///
 /// `settings` are the keys and values of `--set`, for example `{"analysis.min_samples": 5}`. With `save` the results and the
 /// report are written beside the session, those of other settings as a variant with the name `name`. `calibration_from` is an
-/// earlier session of the same skin, whose calibration the calibration presses correct.
+/// earlier session of the same skin, whose calibration the calibration presses correct. INVALID results raise
+/// `InvalidSessionWarning`.
 #[pyfunction]
 #[pyo3(signature = (path, settings=None, *, name=None, reference_code=false, calibration_from=None, save=false))]
 pub(crate) fn analyze<'py>(
@@ -44,7 +45,7 @@ pub(crate) fn analyze<'py>(
         };
         library::analyze(&path, choices, save).map(|document| document.to_string())
     });
-    to_python(py, &text.map_err(raised)?)
+    results_to_python(py, &path, &text.map_err(raised)?)
 }
 
 /// Compares two or more skins and returns the results, as `skinrig compare` does.

@@ -1,8 +1,13 @@
 //! Owns arguments from Python: settings as `key=value`, and paths.
 
+use std::path::Path;
+
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
+use skinrig::library;
+
+use crate::error::{warn_invalid, why_invalid};
 
 /// Settings as `--set` takes them: a text stands as it is, everything else as JSON, which YAML reads.
 pub(crate) fn overrides(settings: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
@@ -21,6 +26,18 @@ pub(crate) fn overrides(settings: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<St
         Ok(format!("{key}={value}"))
     };
     settings.iter().map(one).collect()
+}
+
+/// The results of a session as Python's own types, after a warning if they are INVALID.
+pub(crate) fn results_to_python<'py>(
+    py: Python<'py>,
+    session: &Path,
+    json: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    if let Some(why) = library::invalid_results(session, json).and_then(why_invalid) {
+        warn_invalid(py, &why)?;
+    }
+    to_python(py, json)
 }
 
 /// A document of results as Python's own types.

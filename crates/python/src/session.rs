@@ -13,11 +13,9 @@ use skinrig_model::{CameraId, RunHeader};
 use skinrig_recorder::SessionReader;
 use skinrig_results::{ChunkIndex, Origin, events_between};
 
-use crate::error::{
-    InputError, InvalidSessionWarning, no_table, raised, unreadable, without_styles,
-};
+use crate::error::{InputError, no_table, raised, unreadable, warn_invalid, why_invalid};
 use crate::events::PackedEvents;
-use crate::options::to_python;
+use crate::options::{results_to_python, to_python};
 use crate::table::Columns;
 
 /// A session file, opened for reading, sealed or still growing.
@@ -67,8 +65,7 @@ impl Session {
         let found = Arc::new(AnalysisTables {
             presses: Columns::of(&source, TableName::Presses).map_err(no_table)?,
             results: Columns::of(&source, TableName::Results).map_err(no_table)?,
-            invalid: library::invalid(&self.path, &analysis)
-                .and_then(|failure| CString::new(without_styles(&failure.message)).ok()),
+            invalid: library::invalid(&self.path, &analysis).and_then(why_invalid),
         });
         *analysed = Some(Arc::clone(&found));
         Ok(found)
@@ -78,8 +75,7 @@ impl Session {
     fn warned(&self, py: Python<'_>) -> PyResult<Arc<AnalysisTables>> {
         let analysed = py.detach(|| self.analysed())?;
         if let Some(why) = &analysed.invalid {
-            let category = py.get_type::<InvalidSessionWarning>();
-            PyErr::warn(py, &category, why, 1)?;
+            warn_invalid(py, why)?;
         }
         Ok(analysed)
     }
@@ -279,11 +275,12 @@ impl Session {
         py.detach(|| library::variants(&self.path, &self.session_id))
     }
 
-    /// The results that `skinrig analyze` stored beside the session, as a dict; with a `name` those of a variant.
+    /// The results that `skinrig analyze` stored beside the session, as a dict; with a `name` those of a variant. INVALID ones raise
+    /// `InvalidSessionWarning`.
     #[pyo3(signature = (name=None))]
     fn analysis<'py>(&self, py: Python<'py>, name: Option<&str>) -> PyResult<Bound<'py, PyAny>> {
         let text = py.detach(|| library::stored_results(&self.path, &self.session_id, name));
-        to_python(py, &text.map_err(raised)?)
+        results_to_python(py, &self.path, &text.map_err(raised)?)
     }
 
     fn __repr__(&self) -> String {

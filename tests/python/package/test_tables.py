@@ -1,5 +1,7 @@
 """Tables and events of a session are those of its export."""
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -101,7 +103,23 @@ def test_a_resumed_session(tmp_path):
         assert len(found) > 100 and np.array_equal(found, expected)
 
 
-@pytest.mark.parametrize("read", [lambda s: s.presses, lambda s: s.results, lambda s: s.columns("presses")])
+def stored_results(session):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        skinrig.analyze(session.path, save=True)
+    return session.analysis()
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda s: s.presses,
+        lambda s: s.results,
+        lambda s: s.columns("presses"),
+        stored_results,
+        lambda s: skinrig.analyze(s.path),
+    ],
+)
 def test_numbers_of_an_invalid_session_raise_a_warning(tmp_path, read):
     path = skinrig.simulate(SMALL, tmp_path, {"analysis.alignment.max_residual": "0.001 us"})
     with pytest.warns(skinrig.InvalidSessionWarning, match="INVALID, do not use"):

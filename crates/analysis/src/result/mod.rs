@@ -5,6 +5,7 @@ mod audit;
 mod calibration;
 mod campaign;
 mod clock_map;
+mod common_exclusion;
 mod coverage;
 mod evidence;
 mod evidence_parts;
@@ -37,6 +38,7 @@ pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
 pub use campaign::CampaignLooks;
 pub use clock_map::{ClockMap, MapName};
+pub use common_exclusion::CommonExclusion;
 pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
 pub use evidence::Evidence;
 pub(crate) use evidence::MOST_OF_GUESS;
@@ -66,7 +68,7 @@ pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
 pub use termination::Termination;
 pub use violation::AlignmentViolation;
-pub use warning::{CommonExclusion, Warning, WarningCause};
+pub use warning::{Warning, WarningCause};
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{

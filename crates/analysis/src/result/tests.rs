@@ -400,6 +400,11 @@ fn of_results() -> Vec<(Value, &'static str)> {
              filled in, their errors say nothing about the skin; leave these presses out with `skinrig select`",
         ),
         (
+            json!({"kind": "few_decide", "presses": [12, 40], "limit_mm": 8.6, "rmse_mm": 5.24, "without_mm": 2.21}),
+            "few presses decide the RMSE: it is 5.24 mm, 2.21 mm without press 12, press 40, off by more than 9 mm; look \
+             whether their rows of the press list are right, and at their events",
+        ),
+        (
             json!({"kind": "left_out_unknown", "rmse_mm": estimate(26.0), "extent_mm": 0.9}),
             "the RMSE where no press calibrated, 26.00 mm [25.50, 26.50], is unknown: its interval is wider than the pressed area \
              (1 mm); rays that are nearly parallel there send some estimates far off",

@@ -5,10 +5,10 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CalibrationModel, CameraId, Locator, PressId, Reaction, StopQuestion};
 
-use super::warning_words::{in_words, share_of_crop};
+use super::common_exclusion::{CommonExclusion, most};
+use super::warning_words::{in_words, listed, share_of_crop};
 use super::{Estimate, Fault};
 use crate::clock::{MarksError, RatesError};
-use crate::exclusion::Exclusion;
 use crate::locator::FitError;
 use crate::with_text::with_text;
 
@@ -76,6 +76,7 @@ impl WarningCause {
                 | Self::UnsuitableSettings { .. }
                 | Self::UnusedSetting { .. }
                 | Self::RepeatedPositions { .. }
+                | Self::FewDecide { .. }
                 | Self::LeftOutUnknown { .. }
                 | Self::LocatorUnfit { .. }
                 | Self::FewLocationsForModel { .. }
@@ -490,7 +491,7 @@ pub enum WarningCause {
     #[error(
         "{} of {of} presses that correct the earlier calibration are outliers and count less: {}",
         .presses.len(),
-        .presses.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+        listed(.presses)
     )]
     RemountOutliers {
         /// The outliers.
@@ -536,7 +537,7 @@ pub enum WarningCause {
     #[error(
         "event storm in {}: up to {times:.0} times the events of other presses at that depth, which hide the touch; find what flickers, \
          leave the press out with `skinrig select`, and set `suspend.event_rate` in the protocol",
-        .presses.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+        listed(.presses)
     )]
     EventStorms {
         /// The presses.
@@ -569,6 +570,21 @@ pub enum WarningCause {
         /// The last of them.
         last: PressId,
     },
+    /// A few presses decide it.
+    #[error(
+        "few presses decide the RMSE: it is {rmse_mm:.2} mm, {without_mm:.2} mm without {}, off by more than {limit_mm:.0} mm; look \
+         whether their rows of the press list are right, and at their events", listed(.presses)
+    )]
+    FewDecide {
+        /// The presses, at most a tenth of all.
+        presses: Vec<PressId>,
+        /// Their errors are larger than this, mm.
+        limit_mm: f64,
+        /// RMSE of all scored presses, mm.
+        rmse_mm: f64,
+        /// RMSE without these presses, mm.
+        without_mm: f64,
+    },
     /// The RMSE where no press calibrated has an interval wider than the pressed area.
     #[error(
         "the RMSE where no press calibrated, {}, is unknown: its interval is wider than the pressed area ({extent_mm:.0} mm); rays that \
@@ -581,20 +597,4 @@ pub enum WarningCause {
         /// Diagonal of the smallest rectangle around the measured positions, mm.
         extent_mm: f64,
     },
-}
-
-/// The rule that excludes most presses.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CommonExclusion {
-    /// Presses that it excludes.
-    pub presses: usize,
-    /// Why the first of them does not count.
-    pub example: Exclusion,
-}
-
-fn most(common: Option<&CommonExclusion>) -> String {
-    common.map_or_else(String::new, |common| {
-        let (n, label) = (common.presses, common.example.label());
-        format!(" (most often, {n} times: {label})")
-    })
 }

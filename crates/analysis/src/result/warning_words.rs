@@ -1,6 +1,14 @@
 //! Numbers in the texts of warnings.
 
+use skinrig_model::PressId;
+
 use super::Estimate;
+
+/// `press 4, press 20`.
+pub(super) fn listed(presses: &[PressId]) -> String {
+    let names: Vec<String> = presses.iter().map(ToString::to_string).collect();
+    names.join(", ")
+}
 
 /// Share of the crop in brackets; empty if it rounds to nothing.
 pub(super) fn share_of_crop(pixels: u32, of: u32) -> String {

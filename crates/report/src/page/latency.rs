@@ -118,7 +118,7 @@ pub(super) fn felt(a: &Analysis) -> Option<Table> {
     if let Some(r) = &f.reactions {
         row("contact to new set point (ms)", &r.reaction_ms, 1);
         row("last event to new set point (ms)", &r.since_event_ms, 1);
-        row("depth reached (mm)", &r.depth_mm, 2);
+        row("measured depth (mm)", &r.depth_mm, 2);
     }
     for text in felt_notes(f) {
         grid.note(text);
