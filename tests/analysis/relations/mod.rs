@@ -118,11 +118,10 @@ fn the_session_has_failures_depths_and_studies() {
     assert!((1.0..3.0).contains(&a.scored.rmse_mm.value.unwrap()));
     assert!(a.findings.is_empty());
     let causes = a.warnings.iter().map(|w| &w.cause);
-    assert!(
-        causes
-            .clone()
-            .all(|c| matches!(c, WarningCause::ExclusionsMatter { .. }))
-    );
+    assert!(causes.clone().all(|c| matches!(
+        c,
+        WarningCause::ExclusionsMatter { .. } | WarningCause::FewDecide { .. }
+    )));
     assert_eq!(a.depths.len(), 2);
     assert!(
         a.indentation

@@ -70,11 +70,11 @@ fn a_plan_may_list_its_presses_in_any_order() {
             if let Some(path_there) = moved("presses[", path) {
                 *path = path_there;
             }
-            if kind(path) == "presses[].press" {
+            if ["presses[].press", "warnings[].presses[]"].contains(&kind(path).as_str()) {
                 number(figure, |n| (other(n as usize - 1) + 1) as f64);
             }
         },
-        // Lists by press, and random choices by press or in the order of the plan.
+        // Lists by press, texts with their numbers, and random choices by press or in the order of the plan.
         silent: &|kind| {
             let lists = [
                 "pictures",
@@ -82,6 +82,7 @@ fn a_plan_may_list_its_presses_in_any_order() {
                 "indentation",
                 "latency.onsets",
                 "locator.model.learnt",
+                "warnings[].text",
             ];
             let random = [
                 "reduction.curves[].rows",
