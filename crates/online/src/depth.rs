@@ -2,7 +2,8 @@
 //!
 //! Of each camera, the geometric mean of those depths, weighted by a Gaussian of the distance from the touch to the presses, as wide as
 //! half the distance between neighbouring places; then that of both cameras, weighted by what their counts tell. Presses that never gave
-//! as many events are extended by the power law of the second half of their events, and lose weight. The interval holds at every instant of the touch ([`Envelope`]).
+//! as many events are extended by the power law of the second half of their events, and lose weight. The interval holds at every instant
+//! of the touch ([`Envelope`]). It is that of presses with the speed and the tip of the calibration presses.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::TouchDepth;
