@@ -94,6 +94,7 @@ impl SessionSense {
                     places: skin.places(),
                     has_regions: skin.has_regions(),
                     has_depths: skin.has_depths(),
+                    has_depths_elsewhere: skin.has_depths_elsewhere(),
                 });
                 self.worker.start(skin);
             }

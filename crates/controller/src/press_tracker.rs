@@ -97,6 +97,7 @@ pub(crate) struct PressTracker {
     depth: Option<Settling>,
     up: Option<Settling>,
     down_from: HostTime,
+    braking_from: Option<HostTime>,
     up_from: Option<HostTime>,
     previous: Option<PoseSample>,
     start_set_point_mm: Option<f64>,
@@ -134,6 +135,7 @@ impl PressTracker {
             depth: None,
             up: None,
             down_from,
+            braking_from: None,
             up_from: None,
             previous: last,
             start_set_point_mm: last.map(|p| p.commanded.z_mm),
@@ -203,6 +205,11 @@ impl PressTracker {
                 self.approach = Some(s.t);
             }
         }
+        let brakes = self.braking_from.is_some_and(|t| s.t > t) && !rising;
+        if brakes && (s.commanded.z_mm - self.bottom().z_mm).abs() > MOVED_MM {
+            self.depth_mm = self.surface_mm() - s.commanded.z_mm;
+            self.indent_from(s.t);
+        }
         self.settle(s, rising);
         if self.at_depth.is_some() {
             if !rising {
@@ -248,10 +255,16 @@ impl PressTracker {
         self.depth = Some(Settling::new(target, &self.limits, t));
     }
 
-    /// The tip stops at height `z_mm` by a command at `t`, instead of at its depth.
-    pub(crate) fn stop_at(&mut self, z_mm: f64, t: HostTime) {
-        self.depth_mm = self.surface_mm() - z_mm;
-        self.indent_from(t);
+    /// The tip was told at `t` to brake: its depth is that at which the set point comes to rest.
+    pub(crate) const fn brake_from(&mut self, t: HostTime) {
+        self.braking_from = Some(t);
+    }
+
+    /// True while the set point is above full depth.
+    #[must_use]
+    pub(crate) fn goes_down(&self) -> bool {
+        let set_point = self.previous.map(|p| p.commanded.z_mm);
+        set_point.is_some_and(|z_mm| z_mm > self.bottom().z_mm + MOVED_MM)
     }
 
     /// Sets target and command time of the upward motion.

@@ -22,9 +22,9 @@ pub enum TouchKind {
     Release,
     /// Bytes were skipped because the estimator could not keep up; it starts again on an idle skin.
     Skipped,
-    /// The press stopped where it was: `t` is the time at which the robot had accepted the new set point.
+    /// The press braked on its way down: `t` is the time at which the robot had accepted to.
     Stopped,
-    /// The press ended its hold: the same.
+    /// The press ended its hold: `t` is the time at which the robot had accepted the new set point.
     Lifted,
 }
 
@@ -84,7 +84,7 @@ pub struct TouchEstimate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Reaction {
-    /// Stops where it is and holds there, instead of going on to its depth.
+    /// Brakes and holds where it comes to rest, instead of going on to its depth.
     #[default]
     Stop,
     /// Ends its hold; at a stated depth also the way down.

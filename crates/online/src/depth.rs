@@ -3,7 +3,8 @@
 //! Of each camera, the geometric mean of those depths, weighted by a Gaussian of the distance from the touch to the presses, as wide as
 //! half the distance between neighbouring places; then that of both cameras, weighted by what their counts tell. Presses that never gave
 //! as many events are extended by the power law of the second half of their events, and lose weight. The interval holds at every instant
-//! of the touch ([`Envelope`]). It is that of presses with the speed and the tip of the calibration presses.
+//! of the touch ([`Envelope`]). It is that of presses with the speed and the tip of the calibration presses. Away from their places, it is
+//! learnt from places that are left out, one press each; with too few places, a touch there has no depth.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::TouchDepth;
@@ -21,6 +22,8 @@ const EXTENDED: f64 = 1.35;
 const EXPONENTS: (f64, f64) = (0.3, 1.2);
 /// Relative error of the depth of one camera that no number of events removes: from some 25 events on, both cameras count nearly alike.
 const SCATTER: f64 = 0.2;
+/// A touch is at a taught place within this share of the Gaussian's width, a quarter of the distance between neighbouring places.
+const AT_A_PLACE: f64 = 0.5;
 /// Weight, relative to that of the nearest press, below which a press does not count.
 const LEAST_WEIGHT: f64 = 1e-3;
 
@@ -127,6 +130,23 @@ impl Courses {
         }
     }
 
+    /// Whether a press taught what touches here give.
+    fn taught(&self, at: [f64; 2]) -> bool {
+        let within = AT_A_PLACE * self.width_mm;
+        self.presses
+            .iter()
+            .any(|(place, _)| distance(*place, at) <= within)
+    }
+
+    /// How far the depths of this press are off, as these courses tell them.
+    fn distances(&self, course: &DepthCourse) -> Distances {
+        let of = |(instant, at): &(Instant, [f64; 2])| {
+            let depth = self.depth_mm(*at, instant.counts)?;
+            Some((total(instant.counts), (depth - instant.depth_mm).abs()))
+        };
+        course.instants.iter().filter_map(of).collect()
+    }
+
     /// Depth of a touch here after so many events, mm; `None` far from all presses.
     fn depth_mm(&self, at: [f64; 2], counts: [Count; 2]) -> Option<f64> {
         let weight = |place: [f64; 2]| {
@@ -167,7 +187,10 @@ fn total(counts: [Count; 2]) -> u32 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct DepthModel {
     courses: Courses,
+    /// At taught places.
     envelope: Envelope,
+    /// At others; `None` if too few places were taught.
+    elsewhere: Option<Envelope>,
 }
 
 impl DepthModel {
@@ -186,31 +209,47 @@ impl DepthModel {
                 .step_by(2)
                 .zip(half(&courses, odd))
             {
-                let of = |(instant, at): &(Instant, [f64; 2])| {
-                    let depth = others.depth_mm(*at, instant.counts)?;
-                    Some((total(instant.counts), (depth - instant.depth_mm).abs()))
-                };
-                *own = course.instants.iter().filter_map(of).collect();
+                *own = others.distances(course);
             }
         }
         distances.retain(|d| !d.is_empty());
         Some(Self {
             courses: Courses::new(courses.iter(), width_mm),
             envelope: Envelope::learn(&distances, HOLDS)?,
+            elsewhere: Envelope::learn(&at_places_left_out(&courses, width_mm), HOLDS),
         })
     }
 
-    /// Depth that a touch here has reached with so many events; `None` with more than any calibration press gave.
+    /// Whether touches away from the taught places have depths.
+    pub(crate) const fn is_known_elsewhere(&self) -> bool {
+        self.elsewhere.is_some()
+    }
+
+    /// Depth that a touch here has reached with so many events; `None` with more than any calibration press gave, and where the places
+    /// tell nothing.
     pub(crate) fn reached(&self, at: [f64; 2], counts: [Count; 2]) -> Option<TouchDepth> {
         let all = total(counts);
-        let depth = |()| {
-            Some(TouchDepth {
-                mm: self.courses.depth_mm(at, counts)?,
-                within_mm: self.envelope.within_mm(all),
-            })
-        };
-        self.envelope.has_seen(all).then_some(()).and_then(depth)
+        if !self.envelope.has_seen(all) {
+            return None;
+        }
+        let mm = self.courses.depth_mm(at, counts)?;
+        let mut within_mm = self.envelope.within_mm(all);
+        if !self.courses.taught(at) {
+            within_mm = within_mm.max(self.elsewhere.as_ref()?.within_mm(all));
+        }
+        Some(TouchDepth { mm, within_mm })
     }
+}
+
+/// The first press of each place, as the presses of all other places tell its depths. Ordered by place.
+fn at_places_left_out(courses: &[DepthCourse], width_mm: f64) -> Vec<Distances> {
+    let first = courses.chunk_by(|a, b| a.location == b.location);
+    let first = first.filter_map(<[DepthCourse]>::first);
+    let left_out = first.map(|course| {
+        let others = courses.iter().filter(|c| c.location != course.location);
+        Courses::new(others, width_mm).distances(course)
+    });
+    left_out.filter(|d| !d.is_empty()).collect()
 }
 
 #[cfg(test)]
@@ -294,6 +333,40 @@ mod tests {
             assert!(share > HOLDS - 0.01, "{side} x {side}, {each}: {share}");
             assert!(share < 0.999 && worst_mm < 0.8, "{share}, {worst_mm} mm");
         }
+    }
+
+    #[test]
+    fn away_from_the_places_the_interval_is_wider_and_holds() {
+        let (mut held, mut all) = (0, 0);
+        for round in 0..30 {
+            let mut rng = seeded::generator(round, 5);
+            let (taught, others): (Vec<_>, Vec<_>) = presses(9, 1, &mut rng)
+                .into_iter()
+                .partition(|_| seeded::signed_unit(&mut rng) < 0.0);
+            let model = DepthModel::learn(taught).unwrap();
+            for new in others {
+                let holds = |(instant, at): &(Instant, [f64; 2])| {
+                    let found = model.reached(*at, instant.counts);
+                    found.is_none_or(|d| (d.mm - instant.depth_mm).abs() <= d.within_mm)
+                };
+                held += u32::from(new.instants.iter().all(holds));
+                all += 1;
+            }
+        }
+        let share = f64::from(held) / f64::from(all);
+        assert!((HOLDS - 0.02..0.999).contains(&share), "{share} of {all}");
+    }
+
+    /// With 9 places, nothing tells how far it is off between them.
+    #[test]
+    fn away_from_few_places_there_is_no_depth() {
+        let mut rng = seeded::generator(3, 5);
+        let model = DepthModel::learn(presses(3, 4, &mut rng)).unwrap();
+        assert!(!model.is_known_elsewhere());
+        let counts = counted([300.0; 2]);
+        assert!(model.reached([-8.0, -8.0], counts).is_some());
+        assert_eq!(model.reached([-12.0, -12.0], counts), None);
+        assert_eq!(model.reached([6.0, 0.0], counts), None);
     }
 
     /// Deeper than any calibration press: no depth, rather than that of the deepest.

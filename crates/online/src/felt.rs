@@ -208,11 +208,10 @@ fn reactions<'o>(
     touches: &[TouchEstimate],
     outcome: impl Fn(PressId) -> Option<&'o PressOutcome>,
 ) -> Option<FeltReactions> {
-    let reaction = touches.iter().find_map(|t| match t.kind {
-        TouchKind::Stopped => Some(Reaction::Stop),
-        TouchKind::Lifted => Some(Reaction::Lift),
-        _ => None,
-    })?;
+    // A press that lifts on the way down first brakes.
+    let reaction = [Reaction::Lift, Reaction::Stop]
+        .into_iter()
+        .find(|reaction| touches.iter().any(|t| t.kind == reaction.kind()))?;
     let of_press = |scored: &ScoredPress| {
         let press = &analysis.presses[scored.row];
         // The last attempt is the one that counts; an earlier one may have reacted where it did not.

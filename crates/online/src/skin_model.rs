@@ -117,6 +117,13 @@ impl SkinModel {
     pub const fn has_depths(&self) -> bool {
         self.depths.is_some()
     }
+
+    /// Whether touches away from the calibration presses have depths.
+    #[must_use]
+    pub fn has_depths_elsewhere(&self) -> bool {
+        let depths = self.depths.as_ref();
+        depths.is_some_and(DepthModel::is_known_elsewhere)
+    }
 }
 
 #[cfg(test)]

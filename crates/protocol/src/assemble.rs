@@ -12,6 +12,7 @@ use crate::file::hex;
 use crate::keys::{
     LimitKeys, MotionKeys, MotionParts, Order, ProtocolKeys, SyncKeys, calibration_possible, roles,
 };
+use crate::online::Taught;
 use crate::path::locations;
 use crate::plan::RunLimits;
 use crate::protocol::{Loader, Motion, Pace, Protocol, Scene, Sync};
@@ -215,9 +216,13 @@ fn assemble(
     if let Some(Some(react)) = online.as_ref().map(|o| o.as_ref().and_then(|o| o.react)) {
         let places = calibrate_at.as_ref().map_or(locations.len(), Vec::len);
         let calibrating = roles.iter().filter(|r| **r == PressRole::Calibrate).count();
-        let presses = places * depths_mm.len() * calibrating;
+        let taught = Taught {
+            presses: places * depths_mm.len() * calibrating,
+            places,
+            of: locations.len(),
+        };
         let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
-        react.can_act(presses, deepest_mm, root.at("online.react"), out);
+        react.can_act(taught, deepest_mm, root.at("online.react"), out);
     }
     let sync = declared(keys.sync, |keys| sync(&keys, outline, &depths_mm))?;
     let presses = locations.len() as u64 * depths_mm.len() as u64 * roles.len() as u64

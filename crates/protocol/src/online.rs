@@ -62,11 +62,22 @@ pub struct React {
     pub depth_mm: Option<f64>,
 }
 
+/// What calibrates.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Taught {
+    /// Presses.
+    pub(crate) presses: usize,
+    /// Places,
+    pub(crate) places: usize,
+    /// of so many.
+    pub(crate) of: usize,
+}
+
 impl React {
-    /// Reports a region or depth that is never known, since so many presses calibrate, and a depth that no press reaches.
+    /// Reports a region or depth that is never known, since so few presses or places calibrate, and a depth that no press reaches.
     pub(crate) fn can_act(
         &self,
-        calibrating: usize,
+        taught: Taught,
         deepest_mm: f64,
         field: &Field,
         out: &mut Collector,
@@ -86,7 +97,7 @@ impl React {
             ),
         ];
         for (key, wanted, least, what) in teach {
-            if wanted.is_none() || calibrating >= least {
+            if wanted.is_none() || taught.presses >= least {
                 continue;
             }
             let at = field.at(key);
@@ -94,8 +105,18 @@ impl React {
                 .expected(format!(
                     "at least {least} calibration presses, which teach {what}"
                 ))
-                .found(calibrating.to_string())
+                .found(taught.presses.to_string())
                 .help(format!("calibrate with more repetitions or locations, or remove `{key}`: presses then react as soon as they are felt"));
+            return;
+        }
+        let least = LEAST_PRESSES_OF_DEPTHS;
+        if self.depth_mm.is_some() && taught.places < taught.of && taught.places < least {
+            let at = field.at("depth");
+            let message = "presses where none calibrates would not react";
+            out.error(at.span, at.path.as_str(), message)
+                .expected(format!("at least {least} calibration locations, which teach how deep a touch is at others, or all"))
+                .found(format!("{} of {}", taught.places, taught.of))
+                .help("calibrate at more locations, or remove `calibrate_at`");
         }
         if let Some(depth_mm) = self.depth_mm.filter(|mm| *mm >= deepest_mm) {
             let at = field.at("depth");

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use skinrig_analysis::metrics::quantile;
 use skinrig_analysis::motion::MotionCourse;
 use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Motion, PressResult, Warning, WarningCause};
@@ -158,14 +159,10 @@ impl AlignedSession {
             without_reaction(&analysis, &touches, wanted, attempt)
         });
         analysis.warnings.extend(without.map(Warning::from));
-        let reactions = felt.as_ref().and_then(|f| f.reactions.as_ref());
-        let stops = reactions.filter(|r| r.reaction == Reaction::Stop);
-        analysis.warnings.extend(stops.and_then(|r| {
-            Some(Warning::from(WarningCause::StoppedWhenFelt {
-                presses: r.depth_mm.n,
-                depth_mm: r.depth_mm.median?,
-            }))
-        }));
+        let short = stopped_when_felt(&self.input, &analysis, |press| {
+            outcomes.get(&press).copied()
+        });
+        analysis.warnings.extend(short.map(Warning::from));
         Ok(AnalyzedSession {
             analysis: Analysis {
                 campaign,
@@ -178,6 +175,23 @@ impl AlignedSession {
             session: self.session,
         })
     }
+}
+
+/// Scored presses that braked on their way down because they were felt, with their depth.
+fn stopped_when_felt<'o>(
+    input: &SessionInput,
+    analysis: &Analysis,
+    outcome: impl Fn(PressId) -> Option<&'o PressOutcome>,
+) -> Option<WarningCause> {
+    let rows = analysis.presses.iter();
+    let scored = rows.filter(|p| p.role == PressRole::Score && p.verdict != Verdict::Missed);
+    let stopped = scored.filter(|p| input.stopped.contains(&p.press));
+    let depth_mm = |p: &PressResult| outcome(p.press)?.measured_depth_mm;
+    let mut depths_mm: Vec<f64> = stopped.filter_map(depth_mm).collect();
+    Some(WarningCause::StoppedWhenFelt {
+        presses: depths_mm.len() as u32,
+        depth_mm: quantile(&mut depths_mm, 0.5)?,
+    })
 }
 
 /// Opens a session and analyses it, through all stages.

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_analysis::result::{AlignmentStatus, LEAST_LOCATED};
-use skinrig_model::{Reaction, Verdict};
+use skinrig_analysis::result::{AlignmentStatus, LEAST_LOCATED, WarningCause};
+use skinrig_model::Verdict;
 
 use super::calibration_checks::calibrating;
 use super::camera_checks::{ambient, cameras, ray_geometry};
@@ -213,14 +213,15 @@ fn check_planted(subjects: &[Subject]) -> Option<Difference> {
 /// Presses that stopped when they were felt did not reach the depth that their rows state.
 fn check_stopped(subjects: &[Subject]) -> Option<Difference> {
     let stopped = |s: &Session| {
-        let reactions = s.analysis.felt.as_ref()?.reactions.as_ref()?;
-        let depths = &reactions.depth_mm;
         let scored =
             s.analysis.presses.iter().filter(|p| {
                 p.role == skinrig_model::PressRole::Score && p.verdict != Verdict::Missed
             });
-        let stops = reactions.reaction == Reaction::Stop;
-        stops.then_some((depths.n, scored.count(), depths.median?))
+        let of = scored.count();
+        s.analysis.warnings.iter().find_map(|w| match w.cause {
+            WarningCause::StoppedWhenFelt { presses, depth_mm } => Some((presses, of, depth_mm)),
+            _ => None,
+        })
     };
     let sessions = || subjects.iter().flat_map(|s| &s.sessions);
     let (stops, all) = (sessions().filter_map(stopped).count(), sessions().count());

@@ -1,11 +1,10 @@
 //! Touches felt while the run records: feeds the sense, records its answers, and lets a press react to them.
 
-use skinrig_model::{CameraId, HostTime, PressFault, Reaction, Record, RunFault, TouchEstimate};
+use skinrig_model::{CameraId, HostTime, Reaction, Record, RunFault, TouchEstimate};
 use skinrig_protocol::React;
 use skinrig_protocol::plan::{PressStep, Step};
 
 use super::Executor;
-use crate::error::Halt;
 use crate::open_press::OpenPress;
 use crate::touch_sense::{SenseAnswer, SensedTouch};
 
@@ -55,6 +54,7 @@ impl Executor<'_> {
                     places,
                     has_regions,
                     has_depths,
+                    has_depths_elsewhere,
                 } => {
                     let mut text =
                         format!("touches are felt from now on, learnt at {places} places");
@@ -63,6 +63,8 @@ impl Executor<'_> {
                     }
                     if !has_depths {
                         text += "; touches have no depths: the depths of the calibrating presses were not measured, or they are too few";
+                    } else if !has_depths_elsewhere {
+                        text += "; touches away from these places have no depths: the places are too few";
                     }
                     self.journal.note(t, text)?;
                     self.record_touch(t, SensedTouch::started(t))?;
@@ -122,34 +124,16 @@ impl Executor<'_> {
         self.feeling.fulfilled(step.react.filter(early)?, since)
     }
 
-    /// Stops the tip where it is, in contact: never deeper than planned. `touch` is why it holds there. Returns the fault if that did not
-    /// happen in time.
-    pub(super) fn stop_here(
-        &mut self,
-        step: &PressStep,
-        touch: SensedTouch,
-        bottom_mm: f64,
-    ) -> Result<Option<PressFault>, Halt> {
-        let Some(found) = self.indenter.position() else {
-            return Ok(None);
-        };
-        let surface_mm = bottom_mm + step.depth_mm;
-        let target = step
-            .at
-            .at_height(found.measured.z_mm.clamp(bottom_mm, surface_mm));
-        let t = match self.command_when_steady(target, step.indent_speed_mm_s)? {
-            Ok(t) => t,
-            Err(off_target) => return Ok(Some(off_target.fault())),
-        };
-        // A press that lifts has reacted when it rises.
-        if step.react.is_some_and(|r| r.then == Reaction::Stop) {
-            let kind = Reaction::Stop.kind();
-            self.record_touch(t, SensedTouch { kind, ..touch })?;
-        }
+    /// Brakes the tip on its way down because of `touch`. It holds where it comes to rest: neither deeper than planned, nor going back.
+    pub(super) fn brake(&mut self, touch: SensedTouch) -> Result<(), RunFault> {
+        self.indenter.hold()?;
+        let t = self.now();
         if let Some(phases) = self.trackers.phases_mut() {
-            phases.stop_at(target.z_mm, t);
+            phases.brake_from(t);
         }
-        Ok(None)
+        // A press that lifts reacts once more, when it rises.
+        let kind = Reaction::Stop.kind();
+        self.record_touch(t, SensedTouch { kind, ..touch })
     }
 
     /// The tip will be lifted because of `touch`.

@@ -185,7 +185,7 @@ impl Executor<'_> {
         Ok(None)
     }
 
-    /// Waits until the tip has settled at its depth, or where it stopped because the press was felt. `from` is the time of the
+    /// Waits until the tip has settled at its depth, or where it came to rest because the press was felt. `from` is the time of the
     /// command. Returns the fault if that did not happen in time.
     fn descend(
         &mut self,
@@ -194,7 +194,7 @@ impl Executor<'_> {
         bottom_mm: f64,
         deadline: HostTime,
     ) -> Result<Option<PressFault>, Halt> {
-        let mut stopped = false;
+        let mut brakes = false;
         loop {
             let phases = self.trackers.phases();
             if phases.is_some_and(|t| t.at_depth().is_some()) {
@@ -206,11 +206,9 @@ impl Executor<'_> {
                 return Ok(Some(PressFault::MotionLate(late)));
             }
             match self.reacts_going_down(step, from) {
-                Some(touch) if !stopped => {
-                    stopped = true;
-                    if let Some(fault) = self.stop_here(step, touch, bottom_mm)? {
-                        return Ok(Some(fault));
-                    }
+                Some(touch) if !brakes && phases.is_some_and(PressTracker::goes_down) => {
+                    brakes = true;
+                    self.brake(touch)?;
                 }
                 _ => self.tick(Some(deadline))?,
             }
