@@ -131,6 +131,8 @@ pub(crate) fn camera_pass(
             Some(pixels) => pixels,
             None => events.count(PixelCounts::new(settings.crop_v[k], &list))?,
         };
+        let quiet = pixels.quiet(|window| input.planned[list[window].row].id);
+        warnings.extend(quiet.into_iter().map(WarningCause::QuietPart));
         hot_pixels = pixels.hot(settings);
         // Where only hot pixels fire, the camera is silent.
         let any_hot = !hot_pixels.pixels.is_empty();

@@ -1,12 +1,16 @@
-//! Owns which pixels are hot: they fire in idle time again and again, and no more during presses.
+//! Owns the events of each pixel between presses and during them, and which pixels are hot: they fire in idle time again and again, and no
+//! more during presses.
 //!
 //! A few hot pixels, or a reflection that flickers, make clusters that no press made. The background that
 //! [`Background`](crate::background::Background) assumes is uniform, so pixels far above it are found one by one and left out.
 
-use skinrig_model::{AnalysisSettings, CdEvent, SENSOR_WIDTH};
+use skinrig_model::{AnalysisSettings, CdEvent, PressId, SENSOR_WIDTH};
 
 use crate::pixels::PixelSet;
-use crate::result::HotPixels;
+use crate::quiet_parts::{
+    Fired, IdleTime, empty_run, missing_polarity, quiet_for_a_time, side_of, strip_of,
+};
+use crate::result::{HotPixels, QuietPart};
 use crate::segment::Window;
 
 /// Idle times in which a hot pixel fires, at least; and as a share of all.
@@ -45,6 +49,8 @@ pub(crate) struct PixelCounts {
     /// The span of the last event.
     at: usize,
     pixels: Vec<Pixel>,
+    /// Pixels that fired, by number of the idle time.
+    fired: Vec<Fired>,
 }
 
 impl PixelCounts {
@@ -73,6 +79,7 @@ impl PixelCounts {
             rows,
             spans,
             at: 0,
+            fired: vec![Fired::default(); windows.len()],
             pixels: vec![Pixel::default(); height * usize::from(SENSOR_WIDTH)],
         }
     }
@@ -90,8 +97,12 @@ impl PixelCounts {
                 None => pixel.press_events = pixel.press_events.saturating_add(1),
                 Some(number) => {
                     pixel.idle_events = pixel.idle_events.saturating_add(1);
-                    pixel.spans += u32::from(pixel.last_span != number);
-                    pixel.last_span = number;
+                    if pixel.last_span != number {
+                        pixel.last_span = number;
+                        pixel.spans += 1;
+                        let fired = &mut self.fired[number as usize - 1];
+                        fired[strip_of(event.x)][side_of(event.polarity)] += 1;
+                    }
                 }
             }
         }
@@ -105,6 +116,42 @@ impl PixelCounts {
         }
         self.at = self.spans.partition_point(|s| s.to_us <= t_us);
         self.spans.get(self.at).is_some_and(holds)
+    }
+
+    /// Parts of the picture that are quiet, during a part of the session or throughout. `press`: of each window.
+    pub(crate) fn quiet(&self, press: impl Fn(usize) -> PressId) -> Vec<QuietPart> {
+        let idle = self.spans.iter().filter_map(|span| {
+            let window = span.idle? as usize - 1;
+            Some(IdleTime {
+                press: press(window),
+                seconds: (span.to_us - span.from_us) as f64 * 1e-6,
+                fired: self.fired[window],
+            })
+        });
+        let idle: Vec<IdleTime> = idle.collect();
+        let for_a_time = quiet_for_a_time(&idle);
+        let width = usize::from(SENSOR_WIDTH);
+        let (mut by_column, mut by_row) = (vec![0; width], vec![0; self.pixels.len() / width]);
+        for (index, pixel) in self.pixels.iter().enumerate() {
+            let events = u64::from(pixel.idle_events) + u64::from(pixel.press_events);
+            by_column[index % width] += events;
+            by_row[index / width] += events;
+        }
+        let span =
+            |(first, last): (usize, usize), from: u16| (from + first as u16, from + last as u16);
+        let throughout = |columns, rows, polarity| QuietPart {
+            columns,
+            rows,
+            polarity,
+            presses: None,
+            share: 0.0,
+        };
+        let columns = empty_run(&by_column).map(|run| throughout(Some(span(run, 0)), None, None));
+        let rows =
+            empty_run(&by_row).map(|run| throughout(None, Some(span(run, self.rows.0)), None));
+        let polarity = missing_polarity(&idle).map(|missing| throughout(None, None, Some(missing)));
+        let throughout = columns.into_iter().chain(rows).chain(polarity);
+        for_a_time.into_iter().chain(throughout).collect()
     }
 
     /// The hot pixels.

@@ -56,6 +56,7 @@ mod press_event_collector;
 pub mod press_events;
 mod press_spans;
 mod press_view;
+mod quiet_parts;
 pub mod rates;
 pub mod reduction;
 pub mod reference_code;

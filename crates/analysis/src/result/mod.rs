@@ -12,6 +12,7 @@ mod evidence_parts;
 #[cfg(test)]
 mod evidence_tests;
 mod felt;
+mod grave;
 mod indentation;
 mod latency;
 mod left_out;
@@ -19,6 +20,7 @@ mod locator;
 mod motion;
 mod other_reading;
 mod paired_test;
+mod quiet_part;
 mod recalibration;
 mod reduction;
 mod reference;
@@ -63,6 +65,7 @@ pub use motion::{Motion, MotionBin, PressMotion, TipSample};
 pub use other_reading::OtherReading;
 pub(crate) use other_reading::{Corner, FrameChange, Origin, OtherPlan, Turn};
 pub use paired_test::PairedTest;
+pub use quiet_part::QuietPart;
 pub use recalibration::{CameraMove, EarlierSession, Move, Recalibration, RemountPart};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
@@ -88,8 +91,9 @@ use crate::rule::Rule;
 /// errors of its own. Version 19: a place that a plan lists again is one location. Version
 /// 20: a look needs half of the presses, and an open question is a warning. Version 24: the window of a long hold ends 1 s after the depth was
 /// reached. Version 29: positions in another scale are also found about their middle, and unused settings are named. Version 30: so are
-/// lists of presses in any other order. Version 31: touches felt while recording have depths.
-pub const ANALYSIS_VERSION: u32 = 31;
+/// lists of presses in any other order. Version 31: touches felt while recording have depths. Version 32: parts
+/// of the picture without events are named.
+pub const ANALYSIS_VERSION: u32 = 32;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

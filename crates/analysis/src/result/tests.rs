@@ -405,6 +405,29 @@ fn of_results() -> Vec<(Value, &'static str)> {
              whether their rows of the press list are right, and at their events",
         ),
         (
+            json!({"camera": "camera1", "kind": "quiet_part", "columns": [320, 639], "rows": null, "polarity": null,
+                   "presses": [64, 127], "share": 0.0}),
+            "camera 1: events of columns 320 to 639 fall to 0 % of their usual number between presses, from press 64 to press 127: find \
+             out what changed there, such as light, lens, cable or bias, and record these presses again",
+        ),
+        (
+            json!({"camera": "camera2", "kind": "quiet_part", "columns": null, "rows": null, "polarity": "on",
+                   "presses": [64, 127], "share": 0.04}),
+            "camera 2: ON events of the whole picture fall to 4 % of their usual number between presses, from press 64 to press 127: find \
+             out what changed there, such as light, lens, cable or bias, and record these presses again",
+        ),
+        (
+            json!({"camera": "camera1", "kind": "quiet_part", "columns": null, "rows": null, "polarity": "off",
+                   "presses": null, "share": 0.0}),
+            "camera 1: OFF events of the whole picture are missing throughout: look at the biases, and at what converted the recording",
+        ),
+        (
+            json!({"camera": "camera1", "kind": "quiet_part", "columns": null, "rows": [262, 360], "polarity": null,
+                   "presses": null, "share": 0.0}),
+            "camera 1: events of rows 262 to 360 are missing throughout, although those beside them are there: a mask, a region of \
+             interest or dead pixels hide a part of the skin, or events were lost",
+        ),
+        (
             json!({"kind": "left_out_unknown", "rmse_mm": estimate(26.0), "extent_mm": 0.9}),
             "the RMSE where no press calibrated, 26.00 mm [25.50, 26.50], is unknown: its interval is wider than the pressed area \
              (1 mm); rays that are nearly parallel there send some estimates far off",

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::{CalibrationModel, CameraId, Locator, PressId, Reaction, StopQuestion};
 
 use super::common_exclusion::{CommonExclusion, most};
+use super::quiet_part::QuietPart;
 use super::warning_words::{in_words, listed, share_of_crop};
 use super::{Estimate, Fault};
 use crate::clock::{MarksError, RatesError};
@@ -60,28 +61,6 @@ impl fmt::Display for Warning {
             (None, None) => {}
         }
         self.cause.fmt(f)
-    }
-}
-
-impl WarningCause {
-    /// Whether something else was done or counted than was asked for, which concerns every number.
-    #[must_use]
-    pub const fn is_grave(&self) -> bool {
-        matches!(
-            self,
-            Self::NotSealed
-                | Self::WithoutReaction { .. }
-                | Self::UndecidedLooks { .. }
-                | Self::WindowsOverlap
-                | Self::UnsuitableSettings { .. }
-                | Self::UnusedSetting { .. }
-                | Self::RepeatedPositions { .. }
-                | Self::FewDecide { .. }
-                | Self::LeftOutUnknown { .. }
-                | Self::LocatorUnfit { .. }
-                | Self::FewLocationsForModel { .. }
-                | Self::ImplausibleModel { .. }
-        )
     }
 }
 
@@ -585,6 +564,9 @@ pub enum WarningCause {
         /// RMSE without these presses, mm.
         without_mm: f64,
     },
+    /// A part of the picture is quiet.
+    #[error("{0}")]
+    QuietPart(QuietPart),
     /// The RMSE where no press calibrated has an interval wider than the pressed area.
     #[error(
         "the RMSE where no press calibrated, {}, is unknown: its interval is wider than the pressed area ({extent_mm:.0} mm); rays that \
