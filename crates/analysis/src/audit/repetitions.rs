@@ -11,6 +11,9 @@ use crate::result::{Evidence, Fault, Finding, Law};
 
 /// Smaller median differences between repetitions are ignored, px: the radius of a cluster.
 const MIN_MOVE_PX: f64 = 10.0;
+/// A move matters from here on, px, if it is also this many times the scatter between repetitions: it then decides the error.
+const SMALL_MOVE_PX: f64 = 4.0;
+const SCATTERS: f64 = 3.0;
 /// A move is certain above this many standard errors of the median.
 const SIGMAS: f64 = 5.0;
 /// Minimum number of press pairs for a statement.
@@ -100,7 +103,8 @@ fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<
         let moved = median(moves.clone())?;
         let scatter = median(moves.iter().map(|m| (m - moved).abs()).collect())?;
         let error = MEDIAN_ERROR * scatter / (n as f64).sqrt();
-        if moved.abs() > MIN_MOVE_PX && moved.abs() > SIGMAS * error {
+        let matters = moved.abs() > SMALL_MOVE_PX && moved.abs() > SCATTERS * scatter;
+        if (moved.abs() > MIN_MOVE_PX || matters) && moved.abs() > SIGMAS * error {
             let evidence = Evidence::RepetitionMoved {
                 repetition: *repetition,
                 moved_px: moved,
