@@ -88,6 +88,25 @@ impl Comparison {
         self.table.first()
     }
 
+    /// Which certainly locates fewer presses, skin `subject` or the first, with the row of the located rate. The errors of that skin are
+    /// those of its easier presses.
+    #[must_use]
+    pub fn fewer_located(&self, subject: usize) -> Option<(usize, &Row)> {
+        let row = self
+            .table
+            .iter()
+            .find(|r| r.metric == Metric::LocatedRate)?;
+        let all = &row.against_first;
+        let difference = all.iter().find(|a| a.subject == subject)?.difference()?;
+        if difference.high.is_some_and(|high| high < 0.0) {
+            Some((subject, row))
+        } else if difference.low.is_some_and(|low| low > 0.0) {
+            Some((0, row))
+        } else {
+            None
+        }
+    }
+
     /// Verdict on the RMSE of skin `subject` against the first.
     #[must_use]
     pub fn verdict(&self, subject: usize) -> Option<Verdict> {

@@ -299,6 +299,11 @@ fn depths_that_one_skin_did_not_locate_are_not_compared() {
         .map(|v| v.value.as_ref().unwrap().value)
         .collect();
     assert!(is_near(rates[0], 1.0) && rates[1] < 0.6, "{rates:?}");
+    // The verdict on the RMSE says so, whichever is the first.
+    assert_eq!(found.fewer_located(1).map(|(skin, _)| skin), Some(1));
+    let turned = compared(&b, &a);
+    assert_eq!(turned.fewer_located(1).map(|(skin, _)| skin), Some(0));
+    assert!(compared(&a, &a).fewer_located(1).is_none());
 }
 
 #[test]

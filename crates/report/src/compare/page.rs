@@ -128,6 +128,10 @@ fn verdict_card(result: &Comparison, k: usize) -> Group {
     if is_decided && compared.is_some_and(|c| c.beyond_margin) {
         value = value.span("unit", " by more than the margin");
     }
+    let fewer = found.and_then(|f| text::fewer_located(result, f));
+    if fewer.is_some() {
+        value = value.span("unit", text::WHERE_LOCATED);
+    }
     let headline = found.map(|f| text::headline(result, f)).unwrap_or_default();
     let mut headline = Text::from(headline);
     if let Some((row, margin)) = row.and_then(|r| Some((r, r.margin?))) {
@@ -156,6 +160,7 @@ fn verdict_card(result: &Comparison, k: usize) -> Group {
         .with(Block::Text("name", name.add(" against A, by RMSE")))
         .with(Block::Text("value", value))
         .with(Block::Text("ci", headline))
+        .with_all(fewer.map(|text| Block::Text("ci", format!("But {text}.").into())))
         .with_all(needed.map(|n| Block::Text("ci", format!("{n}.").into())))
         .with_all(cause.map(|text| Block::Text("ci why", text)))
 }

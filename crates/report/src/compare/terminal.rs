@@ -49,11 +49,14 @@ fn verdicts(result: &Comparison) -> Section {
                 .against_first
                 .iter()
                 .find(|a| a.subject == k)?;
+            let fewer = text::fewer_located(result, found);
             let text = format!(
-                "{} against A: {}. {}{doubts}",
+                "{} against A: {}{}. {}{}{doubts}",
                 skin.letter,
                 text::verdict(found.verdict),
-                text::headline(result, found)
+                fewer.as_ref().map_or("", |_| text::WHERE_LOCATED),
+                text::headline(result, found),
+                fewer.map_or_else(String::new, |text| format!("; but {text}")),
             );
             Some(Note::new("VERDICT", text).tone(Tone::Answer))
         }))

@@ -136,6 +136,28 @@ pub(super) fn counted(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
+/// Limits a verdict on the RMSE, where one skin locates fewer presses.
+pub(super) const WHERE_LOCATED: &str = " where presses are located";
+
+/// That one of both skins locates fewer presses than the other, if this is certain: its RMSE is that of its easier presses.
+pub(super) fn fewer_located(result: &Result, against: &BaselineComparison) -> Option<String> {
+    let (fewer, row) = result.fewer_located(against.subject)?;
+    let of = row.against_first.iter();
+    let compared = of.filter(|a| a.subject == against.subject);
+    let compared = compared.filter_map(|a| a.comparison.as_ref()).next()?;
+    let (own, other) = match fewer {
+        0 => (compared.a.value, compared.b.value),
+        _ => (compared.b.value, compared.a.value),
+    };
+    Some(format!(
+        "{} locates fewer presses: {} against {} {}",
+        result.skins.get(fewer)?.letter,
+        value(row, Some(own)),
+        value(row, Some(other)),
+        row.format.unit,
+    ))
+}
+
 /// RMSE of a skin and the first, with difference and interval.
 pub(super) fn headline(result: &Result, against: &BaselineComparison) -> String {
     let compared = against.comparison.as_ref().zip(against.difference());
