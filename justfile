@@ -17,8 +17,7 @@ test-all:
 # Formatting, lints and docs, as in `.ci/run`.
 lint:
     cargo fmt --all --check
-    cargo clippy --workspace --all-targets --locked -- -D warnings
-    cargo clippy -p skinrig --all-targets --features evk4,tls,postgres --locked -- -D warnings
+    cargo clippy --workspace --all-targets --features skinrig/evk4,skinrig/tls,skinrig/postgres,skinrig/s3 --locked -- -D warnings
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 
 # Mutation tests of one mutant in `share` of a crate (install: `cargo install cargo-mutants`): `just mutants compare 15`,
