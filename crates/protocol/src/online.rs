@@ -32,7 +32,8 @@ pub(crate) struct ReactKeys {
     /// Only once the 95 % region of the position reaches no further than this; absent: as soon as a touch is felt.
     #[setting(above = 0.0, max = 100.0)]
     pub region_mm: Option<f64>,
-    /// Only once the touch is felt to be this deep; a press that lifts then does not go on to its own depth.
+    /// Only once the touch is felt to be this deep, or will be where the robot is already on its way; a press that lifts then does not go on
+    /// to its own depth.
     #[setting(above = 0.0, max = 100.0)]
     pub depth_mm: Option<f64>,
 }
@@ -57,7 +58,7 @@ pub struct React {
     /// The longer semi-axis of the position's region is at most this, mm; `None`: a touch is felt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region_mm: Option<f64>,
-    /// The touch is felt to be at least this deep, mm; `None`: at any depth.
+    /// The touch is felt to be at least this deep, with the set point's way ahead of the tip, mm; `None`: at any depth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_mm: Option<f64>,
 }

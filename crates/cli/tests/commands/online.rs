@@ -145,7 +145,7 @@ fn presses_stop_when_they_are_felt_while_recording() {
     assert!(estimates(&again.touches().unwrap()) == estimates(&touches));
 }
 
-/// Presses that stop at a felt depth are about as deep; the session holds the depths that were felt, and its results judge them.
+/// Presses that stop at a felt depth brake before it, by as much as the robot is ahead, and come to rest above their own depth; the session holds the depths that were felt, and its results judge them.
 #[test]
 fn presses_stop_at_a_depth_that_is_felt() {
     let lab = Lab::new();
@@ -156,13 +156,16 @@ fn presses_stop_at_a_depth_that_is_felt() {
     let touches = reader.touches().unwrap();
     let stopped = touches.iter().filter(|t| t.kind == TouchKind::Stopped);
     let felt_mm: Vec<f64> = stopped.map(|t| t.depth.unwrap().mm).collect();
-    assert!(felt_mm.len() >= 7, "{felt_mm:?}");
-    assert!(felt_mm.iter().all(|mm| *mm >= 0.8), "{felt_mm:?}");
+    assert!(felt_mm.len() >= 6, "{felt_mm:?}");
+    assert!(
+        felt_mm.iter().all(|mm| (0.2..0.8).contains(mm)),
+        "{felt_mm:?}"
+    );
     let results = skinrig(&["--json", "analyze", &session]).code(0).out;
     let results: Value = serde_json::from_str(&results).unwrap();
     let felt = &results["analysis"]["felt"];
     let reached = felt["reactions"]["depth_mm"]["median"].as_f64().unwrap();
-    assert!((0.7..1.2).contains(&reached), "{felt}");
+    assert!((0.7..1.45).contains(&reached), "{felt}");
     let count = |key: &str| felt[key].as_u64().unwrap();
     assert!(count("with_depths") >= 7, "{felt}");
     assert!(count("depths_held") + 1 >= count("with_depths"), "{felt}");

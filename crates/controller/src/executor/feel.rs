@@ -121,7 +121,12 @@ impl Executor<'_> {
         since: HostTime,
     ) -> Option<SensedTouch> {
         let early = |react: &React| react.then == Reaction::Stop || react.depth_mm.is_some();
-        self.feeling.fulfilled(step.react.filter(early)?, since)
+        let react = step.react.filter(early)?;
+        // A set point that is ahead of the tip takes it so much deeper.
+        let found = self.indenter.position();
+        let ahead_mm = found.map_or(0.0, |p| p.measured.z_mm - p.commanded.z_mm);
+        let depth_mm = react.depth_mm.map(|mm| mm - ahead_mm.max(0.0));
+        self.feeling.fulfilled(React { depth_mm, ..react }, since)
     }
 
     /// Brakes the tip on its way down because of `touch`. It holds where it comes to rest: neither deeper than planned, nor going back.
