@@ -291,9 +291,7 @@ mod tests {
         events[400..].fill(0);
         assert_eq!(empty_run(&events), Some((400, 639)));
         // One that fades, one that is sparse, and a narrow one.
-        let fading: Vec<u64> = (0..640)
-            .map(|x| if x < 500 { 500 - x } else { 0 })
-            .collect();
+        let fading: Vec<u64> = (0..640).map(|x| 500_u64.saturating_sub(x)).collect();
         assert_eq!(empty_run(&fading), None);
         let sparse: Vec<u64> = (0..640).map(|x| u64::from(x % 40 == 0)).collect();
         assert_eq!(empty_run(&sparse), None);

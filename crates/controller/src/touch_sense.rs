@@ -31,9 +31,9 @@ pub enum SenseAnswer {
         places: usize,
         /// Whether positions have regions.
         has_regions: bool,
-        /// Whether touches have depths,
+        /// Whether touches have depths.
         has_depths: bool,
-        /// also away from these places.
+        /// Whether they also have them away from these places.
         has_depths_elsewhere: bool,
     },
     /// It reports no touches, or no more, in this run.

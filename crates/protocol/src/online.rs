@@ -66,11 +66,11 @@ pub struct React {
 /// What calibrates.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Taught {
-    /// Presses.
+    /// Presses that calibrate.
     pub(crate) presses: usize,
-    /// Places,
+    /// Locations at which they do.
     pub(crate) places: usize,
-    /// of so many.
+    /// All locations.
     pub(crate) of: usize,
 }
 
@@ -108,10 +108,10 @@ impl React {
                 ))
                 .found(taught.presses.to_string())
                 .help(format!("calibrate with more repetitions or locations, or remove `{key}`: presses then react as soon as they are felt"));
-            return;
         }
         let least = LEAST_PRESSES_OF_DEPTHS;
-        if self.depth_mm.is_some() && taught.places < taught.of && taught.places < least {
+        let is_partial = taught.places < taught.of && taught.places < least;
+        if self.depth_mm.is_some() && is_partial && taught.presses >= least {
             let at = field.at("depth");
             let message = "presses where none calibrates would not react";
             out.error(at.span, at.path.as_str(), message)
