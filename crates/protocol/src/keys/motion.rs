@@ -1,7 +1,7 @@
 //! Keys of motion, limits and triggers.
 
 use skinrig_model::{HostDuration, MarkKind, Point3, Skin};
-use skinrig_settings::{Collector, Dimension, Field, Setting, Settings, Shape, Value, ValueRange};
+use skinrig_settings::{Collector, Dimension, Field, Setting, Settings, Shape, Value};
 
 use super::ranges::{DEPTH_MM, POSITIVE_LENGTH_MM, POSITIVE_SPAN_S, SPAN_S, SPEED_MM_S};
 use crate::plan::TripReaction;
@@ -52,10 +52,7 @@ pub(crate) struct SettleCriterion {
 }
 
 impl Setting for Pace {
-    const SHAPE: Shape = Shape::Quantity(
-        &[Dimension::Speed, Dimension::Time],
-        ValueRange::above_zero(1000.0),
-    );
+    const SHAPE: Shape = Shape::Quantity(&[Dimension::Speed, Dimension::Time], SPEED_MM_S);
 
     fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
         match field.value {
