@@ -3,6 +3,7 @@
 use skinrig_model::{HostTime, RawChunk, TouchKind};
 use skinrig_protocol::React;
 
+use crate::overrun::Overruns;
 use crate::touch_sense::{Fed, SensedTouch, TouchSense};
 
 /// The sense, the bytes fed to it, and the current touch.
@@ -14,6 +15,7 @@ pub(crate) struct Feeling {
     pub(crate) touch: Option<FeltTouch>,
     /// Touch for which the tip is about to be lifted.
     pub(crate) lifting: Option<SensedTouch>,
+    pub(crate) overruns: Overruns,
 }
 
 /// The current touch.
@@ -33,6 +35,7 @@ impl Feeling {
             learning: false,
             touch: None,
             lifting: None,
+            overruns: Overruns::default(),
         }
     }
 
@@ -57,9 +60,14 @@ impl Feeling {
         };
     }
 
+    /// What is felt, if that began after `since`.
+    pub(crate) fn since(&self, since: HostTime) -> Option<SensedTouch> {
+        Some(self.touch.filter(|t| t.onset > since)?.newest)
+    }
+
     /// The touch that fulfils `react`, if one is felt that began after `since`: an older one is none of this press.
     pub(crate) fn fulfilled(&self, react: React, since: HostTime) -> Option<SensedTouch> {
-        let touch = self.touch.filter(|t| t.onset > since)?.newest;
+        let touch = self.since(since)?;
         let within = |most: f64| touch.region.is_some_and(|r| r.semi_axes_mm[0] <= most);
         let as_deep = |least: f64| touch.depth.is_some_and(|depth| depth.mm >= least);
         let met = react.region_mm.is_none_or(within) && react.depth_mm.is_none_or(as_deep);

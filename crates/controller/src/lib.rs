@@ -27,6 +27,7 @@ mod journal;
 pub mod looks;
 mod machine;
 mod open_press;
+mod overrun;
 mod pose_trackers;
 mod preflight;
 mod preflight_run;

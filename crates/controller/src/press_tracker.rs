@@ -164,6 +164,11 @@ impl PressTracker {
         self.touched_mm = Some(sample.measured.z_mm);
     }
 
+    /// Depth of the press, mm: as planned, or where it came to rest because it braked.
+    pub(crate) const fn depth_mm(&self) -> f64 {
+        self.depth_mm
+    }
+
     /// Height of the surface, touched or assumed, mm.
     #[must_use]
     pub(crate) fn surface_mm(&self) -> f64 {

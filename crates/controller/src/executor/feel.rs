@@ -8,6 +8,14 @@ use super::Executor;
 use crate::open_press::OpenPress;
 use crate::touch_sense::{SenseAnswer, SensedTouch};
 
+/// Why a press braked on its way down.
+#[derive(Clone, Copy)]
+pub(super) struct Braked {
+    touch: SensedTouch,
+    /// Depth that it was felt to have reached, the set point's lead over it included, mm.
+    reached_mm: Option<f64>,
+}
+
 impl Executor<'_> {
     /// Starts to learn. The plan of a leg that starts in the middle has no such step.
     pub(super) fn begin_learning(&mut self) -> Result<(), RunFault> {
@@ -107,10 +115,19 @@ impl Executor<'_> {
         }))
     }
 
-    /// The touch for which the press ends its hold, if it does so and feels one that began after `since`.
-    pub(super) fn lifts(&self, step: &PressStep, since: HostTime) -> Option<SensedTouch> {
+    /// The touch for which the press ends its hold, if it does so and feels one that began after `since`: at once if it `braked` for it.
+    pub(super) fn lifts(
+        &self,
+        step: &PressStep,
+        since: HostTime,
+        braked: Option<Braked>,
+    ) -> Option<SensedTouch> {
         let react = step.react.filter(|react| react.then == Reaction::Lift)?;
-        self.feeling.fulfilled(react, since)
+        let Some(braked) = braked else {
+            return self.feeling.fulfilled(react, since);
+        };
+        let newest = self.feeling.since(since);
+        Some(newest.unwrap_or(braked.touch))
     }
 
     /// The touch to which the press reacts on the way down, if there is one. At a stated depth a press lifts from there, too; otherwise it
@@ -122,15 +139,22 @@ impl Executor<'_> {
     ) -> Option<SensedTouch> {
         let early = |react: &React| react.then == Reaction::Stop || react.depth_mm.is_some();
         let react = step.react.filter(early)?;
-        // A set point that is ahead of the tip takes it so much deeper.
-        let found = self.indenter.position();
-        let ahead_mm = found.map_or(0.0, |p| p.measured.z_mm - p.commanded.z_mm);
-        let depth_mm = react.depth_mm.map(|mm| mm - ahead_mm.max(0.0));
+        let overrun_mm = self.feeling.overruns.expected_mm(step.indent_speed_mm_s);
+        let before_mm = self.ahead_mm() + overrun_mm;
+        let depth_mm = react.depth_mm.map(|mm| mm - before_mm);
         self.feeling.fulfilled(React { depth_mm, ..react }, since)
     }
 
+    /// How far the set point is ahead of the tip on its way down, mm: it takes the tip so much deeper.
+    fn ahead_mm(&self) -> f64 {
+        let found = self.indenter.position();
+        let ahead_mm = found.map_or(0.0, |p| p.measured.z_mm - p.commanded.z_mm);
+        ahead_mm.max(0.0)
+    }
+
     /// Brakes the tip on its way down because of `touch`. It holds where it comes to rest: neither deeper than planned, nor going back.
-    pub(super) fn brake(&mut self, touch: SensedTouch) -> Result<(), RunFault> {
+    pub(super) fn brake(&mut self, touch: SensedTouch) -> Result<Braked, RunFault> {
+        let reached_mm = touch.depth.map(|depth| depth.mm + self.ahead_mm());
         self.indenter.hold()?;
         let t = self.now();
         if let Some(phases) = self.trackers.phases_mut() {
@@ -138,7 +162,16 @@ impl Executor<'_> {
         }
         // A press that lifts reacts once more, when it rises.
         let kind = Reaction::Stop.kind();
-        self.record_touch(t, SensedTouch { kind, ..touch })
+        self.record_touch(t, SensedTouch { kind, ..touch })?;
+        Ok(Braked { touch, reached_mm })
+    }
+
+    /// A press that braked has come to rest at this depth: the next ones learn from it.
+    pub(super) fn rests_at(&mut self, step: &PressStep, braked: Braked, depth_mm: f64) {
+        if let Some(reached_mm) = braked.reached_mm {
+            let overruns = &mut self.feeling.overruns;
+            overruns.learn(step.indent_speed_mm_s, reached_mm, depth_mm);
+        }
     }
 
     /// The tip will be lifted because of `touch`.

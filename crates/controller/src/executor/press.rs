@@ -5,6 +5,7 @@ use skinrig_protocol::Surface;
 use skinrig_protocol::plan::PressStep;
 
 use super::Executor;
+use super::feel::Braked;
 use super::search::Probe;
 use crate::camera_streams::ReadMode;
 use crate::error::Halt;
@@ -170,14 +171,15 @@ impl Executor<'_> {
         if let Some(phases) = self.trackers.phases_mut() {
             phases.indent_from(t);
         }
-        if let Some(fault) = self.descend(step, t, bottom_mm, deadline)? {
-            return Ok(Some(fault));
-        }
+        let braked = match self.descend(step, t, bottom_mm, deadline)? {
+            Ok(braked) => braked,
+            Err(fault) => return Ok(Some(fault)),
+        };
         let settled = self.trackers.phases().and_then(PressTracker::at_depth);
         let until = settled.unwrap_or(t) + step.hold;
         while self.now() < until {
             self.tick(Some(until))?;
-            if let Some(touch) = self.lifts(step, t) {
+            if let Some(touch) = self.lifts(step, t, braked) {
                 self.lift_for(touch);
                 break;
             }
@@ -186,29 +188,32 @@ impl Executor<'_> {
     }
 
     /// Waits until the tip has settled at its depth, or where it came to rest because the press was felt. `from` is the time of the
-    /// command. Returns the fault if that did not happen in time.
+    /// command. Returns why it braked, if it did, or the fault if it did not settle in time.
     fn descend(
         &mut self,
         step: &PressStep,
         from: HostTime,
         bottom_mm: f64,
         deadline: HostTime,
-    ) -> Result<Option<PressFault>, Halt> {
-        let mut brakes = false;
+    ) -> Result<Result<Option<Braked>, PressFault>, Halt> {
+        let mut braked = None;
         loop {
             let phases = self.trackers.phases();
-            if phases.is_some_and(|t| t.at_depth().is_some()) {
-                return Ok(None);
+            if let Some(rests) = phases.filter(|t| t.at_depth().is_some()) {
+                let depth_mm = rests.depth_mm();
+                if let Some(braked) = braked {
+                    self.rests_at(step, braked, depth_mm);
+                }
+                return Ok(Ok(braked));
             }
             if self.now() >= deadline {
                 let target = step.at.at_height(bottom_mm);
                 let late = self.not_arrived("indentation", target, step.deadline);
-                return Ok(Some(PressFault::MotionLate(late)));
+                return Ok(Err(PressFault::MotionLate(late)));
             }
             match self.reacts_going_down(step, from) {
-                Some(touch) if !brakes && phases.is_some_and(PressTracker::goes_down) => {
-                    brakes = true;
-                    self.brake(touch)?;
+                Some(touch) if braked.is_none() && phases.is_some_and(PressTracker::goes_down) => {
+                    braked = Some(self.brake(touch)?);
                 }
                 _ => self.tick(Some(deadline))?,
             }

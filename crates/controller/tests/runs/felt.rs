@@ -270,6 +270,22 @@ fn a_reaction_waits_for_a_depth_and_a_press_lifts_from_it() {
     }
 }
 
+/// The first press shows how far a press goes on after it was told to brake; the others brake so much earlier.
+#[test]
+fn presses_learn_to_come_to_rest_at_the_depth_stated() {
+    let deep = React {
+        depth_mm: Some(1.2),
+        ..react(Reaction::Stop)
+    };
+    let depths = run_with(deep, Feels::Below(0.2), None, true).depths_mm();
+    let [first, rest @ ..] = &depths[..] else {
+        panic!("{depths:?}")
+    };
+    for mm in rest {
+        assert!((mm - 1.2).abs() < 0.5 * (first - 1.2), "{depths:?}");
+    }
+}
+
 #[test]
 fn a_touch_that_began_before_the_press_is_none_of_it() {
     let felt = run(Reaction::Stop, Feels::Always, Some(0.1));
