@@ -140,7 +140,11 @@ impl Expectation<'_> {
                 _ => {
                     let [x, y] = reading.expected(k, at).1;
                     let px = self.scatter.fixed_mm * libm::hypot(x, y) / slope;
-                    px * px + self.scatter.column_px * self.scatter.column_px * relative
+                    // What no geometry explains.
+                    let [geometry, _] = reading.parameter_variances(k, at, p.columns[k]);
+                    let misfit = (self.model.inflation - 1.0) * geometry / (slope * slope);
+                    let columns = self.scatter.column_px * self.scatter.column_px * relative;
+                    px * px + columns + misfit
                 }
             }
         };

@@ -149,11 +149,12 @@ impl EarlierCalibration {
             (None, None) => return Err(RecalibrationError::EarlierUncalibrated),
             (_, scatter) => scatter.unwrap_or_default(),
         };
-        // A field already corrects what the earlier presses left open about the geometry.
+        // A field already corrects what the earlier presses left open about the geometry. What no geometry explains, the
+        // inflation, is no prior of the move: it stays where it is.
         let size = size(model, 0.5);
         let open = covariance(&self.calibration);
         let unexplained = open.as_ref().filter(|_| fields.is_none());
-        let unexplained = unexplained.map(|c| c * (model.inflation * size));
+        let unexplained = unexplained.map(|c| c * size);
         let prior = motion::prior(&self.geometry, unexplained.as_ref(), &settings.remount);
         let expectation = Expectation {
             geometry: &self.geometry,
@@ -257,7 +258,14 @@ impl EarlierCalibration {
             None => size(&model, LEVEL) * model.inflation,
             Some(_) => 1.0,
         };
-        let row = |i: usize| left.row(i).iter().map(|v| v / divisor).collect();
+        // The earlier geometry was off by so much before, place by place, and a few presses cannot tell where.
+        let earlier = model.geometry_covariance.take();
+        let before = |i: usize, j: usize| earlier.as_ref().map_or(0.0, |rows| rows[i][j]);
+        let row = |i: usize| {
+            let each = 0..PARAMETERS;
+            each.map(|j| before(i, j) + left[(i, j)] / divisor)
+                .collect()
+        };
         let rows: Vec<Vec<f64>> = (0..PARAMETERS).map(row).collect();
         match &mut model.cameras {
             None => model.geometry_covariance = Some(rows),
