@@ -1,9 +1,9 @@
 //! Selection of a choice, confirmed on presses that did not select it.
 //!
 //! The best of many choices looks too good on the presses that chose it. Therefore a third of the locations ranks the choices,
-//! and the others confirm. For a target the front goes through a fixed sequence of tests, from the most accurate to the
-//! cheapest, each at the full level, up to the first that fails: a choice beyond the target passes in at most 2.5 % of the
-//! sessions, however many were tried (Maurer, Hothorn and Lehmacher 1995).
+//! and the others confirm. For a target the session's own settings and the front go through a sequence of tests that the ranking
+//! locations fix, from the most accurate to the cheapest, each at the full level, up to the first that fails: a choice beyond the
+//! target passes in at most 2.5 % of the sessions, however many were tried (Maurer, Hothorn and Lehmacher 1995).
 
 use std::collections::BTreeSet;
 
@@ -81,7 +81,10 @@ impl Measured {
             Requirement::Target(_, cost) => (cost, f64::INFINITY),
             Requirement::Budget(most, cost) => (cost, most),
         };
-        let sequence = self.front(cost, most, &ranking);
+        let sequence = match requirement {
+            Requirement::Target(mm, _) => self.tests(mm, cost, &ranking),
+            Requirement::Budget(..) => self.front(cost, most, &ranking),
+        };
         let mut passed = Err(Unselected::Budget);
         for row in sequence {
             let confirmed_mm = self.confirm(row, &ranking);
@@ -102,11 +105,27 @@ impl Measured {
         passed
     }
 
+    /// Rows to test against a target, in order. If the ranking locations meet it with the session's own settings, those come first: of
+    /// the many others, the one that ranks best may have ranked so by luck, and would end the search. Only cheaper rows follow.
+    fn tests(&self, mm: f64, cost: Cost, ranking: &BTreeSet<u32>) -> Vec<usize> {
+        let front = self.front(cost, f64::INFINITY, ranking);
+        let rows = &self.tradeoff.rows;
+        let own = (rows.first().zip(self.errors.first())).filter(|(own, errors)| {
+            own.competes && ranked_mm(errors, ranking).is_some_and(|rmse| rmse <= mm)
+        });
+        let Some((own, _)) = own else {
+            return front;
+        };
+        let cheaper = |row: &usize| cost.of(&rows[*row]) < cost.of(own);
+        [0].into_iter()
+            .chain(front.into_iter().filter(cheaper))
+            .collect()
+    }
+
     /// Competing rows at a cost of at most `most` that are on the front by the ranking locations; the most accurate first.
     fn front(&self, cost: Cost, most: f64, ranking: &BTreeSet<u32>) -> Vec<usize> {
         let point = |(row, errors): (&Row, &PressErrors)| {
-            let inside = errors.iter().filter(|e| ranking.contains(&e.0));
-            let rmse_mm = sums::root_mean_square(inside.map(|e| e.1))?;
+            let rmse_mm = ranked_mm(errors, ranking)?;
             let is_allowed = row.competes && cost.of(row) <= most;
             is_allowed.then(|| (rmse_mm, cost.of(row)))
         };
@@ -142,4 +161,10 @@ impl Measured {
         let mut draw = || left.swap_remove(seeded::index(&mut rng, left.len()));
         Ok((0..count).map(|_| draw()).collect())
     }
+}
+
+/// RMSE on the ranking locations.
+fn ranked_mm(errors: &PressErrors, ranking: &BTreeSet<u32>) -> Option<f64> {
+    let inside = errors.iter().filter(|e| ranking.contains(&e.0));
+    sums::root_mean_square(inside.map(|e| e.1))
 }
