@@ -133,6 +133,7 @@ pub(crate) fn camera_pass(
         };
         let quiet = pixels.quiet(|window| input.planned[list[window].row].id);
         warnings.extend(quiet.into_iter().map(WarningCause::QuietPart));
+        warnings.extend(pixels.repeated().map(WarningCause::RepeatedEvents));
         hot_pixels = pixels.hot(settings);
         // Where only hot pixels fire, the camera is silent.
         let any_hot = !hot_pixels.pixels.is_empty();

@@ -10,7 +10,8 @@ use crate::pixels::PixelSet;
 use crate::quiet_parts::{
     Fired, IdleTime, empty_run, missing_polarity, quiet_for_a_time, side_of, strip_of,
 };
-use crate::result::{HotPixels, QuietPart};
+use crate::repeats::Repeats;
+use crate::result::{HotPixels, QuietPart, RepeatedEvents};
 use crate::segment::Window;
 
 /// Idle times in which a hot pixel fires, at least; and as a share of all.
@@ -51,6 +52,7 @@ pub(crate) struct PixelCounts {
     pixels: Vec<Pixel>,
     /// Pixels that fired, by number of the idle time.
     fired: Vec<Fired>,
+    repeats: Repeats,
 }
 
 impl PixelCounts {
@@ -80,6 +82,7 @@ impl PixelCounts {
             spans,
             at: 0,
             fired: vec![Fired::default(); windows.len()],
+            repeats: Repeats::new(),
             pixels: vec![Pixel::default(); height * usize::from(SENSOR_WIDTH)],
         }
     }
@@ -88,7 +91,11 @@ impl PixelCounts {
     pub(crate) fn add(&mut self, events: &[CdEvent]) {
         for event in events {
             let inside = (self.rows.0..=self.rows.1).contains(&event.y) && event.x < SENSOR_WIDTH;
-            if !inside || !self.reach(event.t_us) {
+            if !inside {
+                continue;
+            }
+            self.repeats.push(event);
+            if !self.reach(event.t_us) {
                 continue;
             }
             let index = usize::from(event.y - self.rows.0) * usize::from(SENSOR_WIDTH);
@@ -116,6 +123,11 @@ impl PixelCounts {
         }
         self.at = self.spans.partition_point(|s| s.to_us <= t_us);
         self.spans.get(self.at).is_some_and(holds)
+    }
+
+    /// Events of the crop that come once more.
+    pub(crate) fn repeated(&self) -> Option<RepeatedEvents> {
+        self.repeats.found()
     }
 
     /// Parts of the picture that are quiet, during a part of the session or throughout. `press`: of each window.

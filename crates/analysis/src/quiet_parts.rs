@@ -4,10 +4,13 @@
 //! by strip of columns and by the polarity of their first event. A hot pixel counts once. Columns and rows without any event at all are
 //! found over all idle times and presses together.
 
+use std::ops::Range;
+
 use skinrig_model::{Polarity, PressId, SENSOR_WIDTH};
 
 use crate::metrics::quantile;
 use crate::result::QuietPart;
+use crate::stretch::prevailing;
 
 /// Width of a strip, px; divides the width of the sensor.
 const STRIP_PX: u16 = 40;
@@ -172,7 +175,7 @@ impl Stretch {
     }
 }
 
-fn stretch(idle: &[&IdleTime], strips: std::ops::Range<usize>, sides: &[usize]) -> Option<Stretch> {
+fn stretch(idle: &[&IdleTime], strips: Range<usize>, sides: &[usize]) -> Option<Stretch> {
     let count = |t: &&IdleTime| -> f64 {
         let fired = t.fired[strips.clone()].iter();
         f64::from(fired.flat_map(|f| sides.iter().map(|s| f[*s])).sum::<u32>())
@@ -180,7 +183,10 @@ fn stretch(idle: &[&IdleTime], strips: std::ops::Range<usize>, sides: &[usize]) 
     let rates: Vec<f64> = idle.iter().map(|t| count(t) / t.seconds).collect();
     let least = LEAST_SPANS.max((LEAST_SHARE * rates.len() as f64).ceil() as usize);
     let level = QUIET * quantile(&mut rates.clone(), 0.75)?;
-    let (from, to) = quiet_run(&rates, level);
+    let Range {
+        start: from,
+        end: to,
+    } = prevailing(rates.iter().map(|r| *r <= level), NOT_QUIET).1;
     if to - from < least || rates.len() - (to - from) < least {
         return None;
     }
@@ -190,20 +196,6 @@ fn stretch(idle: &[&IdleTime], strips: std::ops::Range<usize>, sides: &[usize]) 
     let fired: f64 = idle[from..to].iter().map(count).sum();
     let share = fired / (usual * seconds);
     (usual * seconds >= LEAST_EXPECTED && share <= QUIET).then_some(Stretch { from, to, share })
-}
-
-/// The stretch with the largest sum, where a quiet time counts 1 and another one -[`NOT_QUIET`].
-fn quiet_run(rates: &[f64], level: f64) -> (usize, usize) {
-    let (mut best, mut sum, mut from) = ((0, 0, 0), 0, 0);
-    for (at, rate) in rates.iter().enumerate() {
-        sum += if *rate <= level { 1 } else { -NOT_QUIET };
-        if sum <= 0 {
-            (sum, from) = (0, at + 1);
-        } else if sum > best.0 {
-            best = (sum, from, at + 1);
-        }
-    }
-    (best.1, best.2)
 }
 
 #[cfg(test)]
@@ -245,7 +237,7 @@ mod tests {
 
     #[test]
     fn what_dies_from_some_press_on_is_named() {
-        let dies = |strips: std::ops::Range<usize>, sides: &[usize], from: usize, to: usize| {
+        let dies = |strips: Range<usize>, sides: &[usize], from: usize, to: usize| {
             let mut all = idle(60, 20);
             for time in &mut all[from..to] {
                 for fired in &mut time.fired[strips.clone()] {

@@ -2,17 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use skinrig_analysis::event_runs::{RollingRuns, token};
 use skinrig_analysis::{AnalysisError, EventSource};
-use skinrig_model::{CameraId, CdEvent, Polarity};
+use skinrig_model::{CameraId, CdEvent};
 
-/// Events in a row that identify a recording: pixels and polarities, not times, which an import may have rounded.
-const RUN: usize = 32;
-/// Fewer pixels in a run are those of a hot pixel or a flicker, which other recordings have too.
-const MIN_PIXELS: usize = 16;
-/// One run in so many is compared, chosen by its content: cutting a recording does not change which.
+/// One run in so many is compared.
 const ONE_IN: u64 = 64;
-/// Multiplier of the rolling hash; odd, so that no bit is lost.
-const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Hashes of runs of events.
 pub(crate) type EventRuns = BTreeSet<u64>;
@@ -24,10 +19,11 @@ pub(crate) type EventRuns = BTreeSet<u64>;
 pub(crate) fn event_runs(source: &dyn EventSource) -> Result<EventRuns, AnalysisError> {
     let mut found = EventRuns::new();
     for camera in CameraId::ALL {
-        let mut runs = RollingRuns::default();
+        let mut runs = RollingRuns::new(ONE_IN);
         let mut each = |events: &[CdEvent]| {
             events.iter().for_each(|event| {
-                found.extend(runs.push(event));
+                // Not times, which an import may have rounded.
+                found.extend(runs.push(token(event, 0)));
             });
         };
         let read = source.for_each_slice(camera, &mut each);
@@ -45,72 +41,33 @@ pub(crate) fn shared(a: &EventRuns, b: &EventRuns) -> f64 {
     a.intersection(b).count() as f64 / smaller as f64
 }
 
-/// The last events of a stream, and their rolling hash.
-#[derive(Default)]
-struct RollingRuns {
-    last: [u64; RUN],
-    events: usize,
-    hash: u64,
-}
-
-impl RollingRuns {
-    /// Hash of the run that ends with this event, if it is one to compare.
-    fn push(&mut self, event: &CdEvent) -> Option<u64> {
-        let on = event.polarity == Polarity::On;
-        let pixel = u64::from(event.x) | u64::from(event.y) << 16 | u64::from(on) << 32;
-        let at = self.events % RUN;
-        let oldest = std::mem::replace(&mut self.last[at], pixel);
-        let beyond = mixed(oldest).wrapping_mul(FACTOR.wrapping_pow(RUN as u32));
-        let longer = self.hash.wrapping_mul(FACTOR).wrapping_add(mixed(pixel));
-        self.events += 1;
-        self.hash = if self.events > RUN {
-            longer.wrapping_sub(beyond)
-        } else {
-            longer
-        };
-        let hash = mixed(self.hash);
-        let is_compared =
-            self.events >= RUN && hash.is_multiple_of(ONE_IN) && self.pixels() >= MIN_PIXELS;
-        is_compared.then_some(hash)
-    }
-
-    fn pixels(&self) -> usize {
-        self.last.iter().collect::<BTreeSet<_>>().len()
-    }
-}
-
-/// Finaliser of `SplitMix64` (Steele, Lea and Flood 2014).
-const fn mixed(mut z: u64) -> u64 {
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 #[cfg(test)]
 mod tests {
+    use skinrig_analysis::event_runs::RUN;
+    use skinrig_model::Polarity;
+    use skinrig_statistics::seeded;
+
     use super::*;
 
-    /// Events of a seed; `mixed` is random enough.
     fn events(seed: u64, n: u64) -> Vec<CdEvent> {
-        let event = |k: u64| {
-            let r = mixed(mixed(seed) ^ k.wrapping_mul(FACTOR));
-            CdEvent {
-                t_us: k * 7,
-                x: (r % 640) as u16,
-                y: (r >> 20) as u16 % 480,
-                polarity: if r >> 63 == 1 {
-                    Polarity::On
-                } else {
-                    Polarity::Off
-                },
-            }
+        let mut rng = seeded::generator(seed, 1);
+        let mut event = |k: u64| CdEvent {
+            t_us: k * 7,
+            x: seeded::index(&mut rng, 640) as u16,
+            y: seeded::index(&mut rng, 480) as u16,
+            polarity: if seeded::index(&mut rng, 2) == 1 {
+                Polarity::On
+            } else {
+                Polarity::Off
+            },
         };
-        (0..n).map(event).collect()
+        (0..n).map(&mut event).collect()
     }
 
     fn runs(events: &[CdEvent]) -> EventRuns {
-        let mut runs = RollingRuns::default();
-        events.iter().filter_map(|e| runs.push(e)).collect()
+        let mut runs = RollingRuns::new(ONE_IN);
+        let each = events.iter();
+        each.filter_map(|e| runs.push(token(e, 0))).collect()
     }
 
     #[test]

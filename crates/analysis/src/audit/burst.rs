@@ -7,6 +7,7 @@ use super::finding::finding;
 use super::observed_press::ObservedPress;
 use super::statistics::median;
 use crate::result::{Analysis, Evidence, Fault, Finding, Law, PeakForce, Response};
+use crate::stretch::prevailing;
 
 /// A camera is blind if its median response is below this many standard errors (noise alone gives 0).
 const MIN_MEDIAN: f64 = 1.0;
@@ -32,7 +33,13 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
             .filter_map(|t| Some((t.press, t.sights[camera.index()].response?)))
             .collect::<Vec<(PressId, f64)>>()
     });
-    let blind = [&one, &two].map(|press_bursts| blind(press_bursts));
+    let stretches = [&one, &two].map(|press_bursts| longest_silent_run(press_bursts));
+    let silent = match stretches {
+        [Some(a), Some(b)] if a.first <= b.last && b.first <= a.last => Some((a, b)),
+        _ => None,
+    };
+    // Where only a part of the presses is silent, in both cameras, it is no matter of a whole camera, however long the part.
+    let blind = [&one, &two].map(|press_bursts| blind(press_bursts).filter(|_| silent.is_none()));
     if let [Some(a), Some(b)] = blind {
         let bursts = CameraId::ALL.map(|c| has_bursts(&analysis.rates[c.index()]));
         let burst_elsewhere = bursts == [true; 2];
@@ -70,9 +77,8 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
             ));
         }
     }
-    let stretches = [&one, &two].map(|press_bursts| longest_silent_run(press_bursts));
-    match stretches {
-        [Some(a), Some(b)] if a.first <= b.last && b.first <= a.last => {
+    match silent {
+        Some((a, b)) => {
             let (first, last) = (a.first.max(b.first), a.last.min(b.last));
             // Measured presses did happen.
             let there = |t: &&ObservedPress<'_>| (first..=last).contains(&t.press);
@@ -88,7 +94,7 @@ pub(super) fn findings(analysis: &Analysis, presses_seen: &[ObservedPress<'_>]) 
             };
             found.push(finding(Law::BurstWithMotion, fault, None, evidence));
         }
-        stretches => {
+        None => {
             for (camera, stretch) in CameraId::ALL.into_iter().zip(stretches) {
                 if let Some(s) = stretch {
                     let evidence = Evidence::NoBursts {
@@ -150,20 +156,11 @@ struct SilentRun {
     last: PressId,
 }
 
-/// The longest significant stretch without bursts: the maximum sum of consecutive presses, where one without response counts
-/// 1 and one with a response -[`RESPONSE_WEIGHT`].
+/// The stretch in which presses without a response prevail, if it stands out.
 fn longest_silent_run(press_bursts: &[(PressId, f64)]) -> Option<SilentRun> {
     let responds = |i: usize| press_bursts[i].1 >= MIN_RESPONSE;
-    let (mut best, mut sum, mut from) = ((0, 0..0), 0, 0);
-    for i in 0..press_bursts.len() {
-        sum += if responds(i) { -RESPONSE_WEIGHT } else { 1 };
-        if sum <= 0 {
-            (sum, from) = (0, i + 1);
-        } else if sum > best.0 {
-            best = (sum, from..i + 1);
-        }
-    }
-    let (sum, range) = best;
+    let silent = (0..press_bursts.len()).map(|i| !responds(i));
+    let (sum, range) = prevailing(silent, RESPONSE_WEIGHT);
     let others = (0..press_bursts.len()).filter(|i| !range.contains(i));
     let respond = others.clone().filter(|i| responds(*i)).count();
     let long =

@@ -10,11 +10,12 @@ use skinrig_model::{CameraId, PressId};
 
 use super::finding::finding;
 use super::observed_press::ObservedPress;
+use super::slow::burst_delay_s;
 use crate::result::{ClockFit, Evidence, Fault, Finding, Law};
 
 /// A burst this close to a press belongs to it, s.
 const NEAR_S: f64 = 0.15;
-/// Smaller steps cannot be told from the width of a burst, s.
+/// Smaller steps cannot be told from the width of a burst, s; those of slow presses not from a burst that comes later in its press.
 const MIN_STEP_S: f64 = 0.2;
 /// Largest offset between a press and its burst, s,
 const REACH_S: f64 = 120.0;
@@ -50,15 +51,16 @@ pub(super) fn findings(
         .collect();
     listed.sort_by(|a, b| a.0.total_cmp(&b.0));
     let times: Vec<f64> = listed.iter().map(|p| p.0).collect();
+    let least_s = MIN_STEP_S.max(burst_delay_s(presses_seen) + NEAR_S);
     let steps = CameraId::ALL.map(|camera| {
         let drift = clocks[camera.index()]?.drift_ppm * 1e-6;
         let contacts = contacts_s[camera.index()];
         // A line through both sides of a step drifts.
         let begin = *times.first()?;
         let even: Vec<f64> = contacts.iter().map(|c| c + drift * (c - begin)).collect();
-        let found = step(&times, contacts)
+        let found = step(&times, contacts, least_s)
             .into_iter()
-            .chain(step(&times, &even));
+            .chain(step(&times, &even, least_s));
         found.max_by_key(|s| s.explained)
     });
     let say = |camera: CameraId, both: bool, found: Step| {
@@ -109,8 +111,8 @@ struct Step {
     one_offset: usize,
 }
 
-/// The likeliest step, if two offsets explain clearly more presses than one.
-fn step(listed: &[f64], contacts: &[f64]) -> Option<Step> {
+/// The likeliest step of at least `least_s`, if two offsets explain clearly more presses than one.
+fn step(listed: &[f64], contacts: &[f64], least_s: f64) -> Option<Step> {
     let n = listed.len();
     let (first, last) = (listed.first()?, listed.last()?);
     let filled = contacts.len() as f64 * 2.0 * NEAR_S / (last - first).max(1.0);
@@ -148,8 +150,7 @@ fn step(listed: &[f64], contacts: &[f64]) -> Option<Step> {
             found as usize >= MIN_PRESSES && f64::from(found) >= MIN_SHARE * of as f64
         };
         let step_s = after_s - before_s;
-        let is_step =
-            step_s.abs() >= MIN_STEP_S && is_seen(before, from) && is_seen(after, n - from);
+        let is_step = step_s.abs() >= least_s && is_seen(before, from) && is_seen(after, n - from);
         is_step.then_some(Step {
             from,
             step_s,
@@ -209,6 +210,10 @@ fn is_near(times: &[f64], at: f64) -> bool {
 mod tests {
     use super::*;
     use crate::audit::even_path::path;
+
+    fn step(listed: &[f64], contacts: &[f64]) -> Option<Step> {
+        super::step(listed, contacts, MIN_STEP_S)
+    }
 
     fn stepped(all: &[f64], from: usize, by_s: f64) -> Vec<f64> {
         let moved = |(i, t): (usize, &f64)| if i < from { *t } else { t + by_s };

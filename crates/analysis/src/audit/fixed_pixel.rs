@@ -3,6 +3,8 @@
 //! A stuck pixel or column, or a constant picture, gives every press a column that says nothing about its position. The
 //! centroids count whether or not the press stands out of the noise, because the analysis locates with all of them.
 
+use std::ops::Range;
+
 use skinrig_model::{CameraId, PressId};
 
 use super::finding::finding;
@@ -10,6 +12,7 @@ use super::readings::{MIN_SPREAD_DEG, Path};
 use super::statistics::median;
 use crate::distinct::distinct;
 use crate::result::{Evidence, Fault, Finding, Law};
+use crate::stretch::prevailing;
 
 /// Columns of a fixed pixel scatter by less than this, px.
 const FIXED_PX: f64 = 2.0;
@@ -51,8 +54,7 @@ pub(super) fn findings(path: &Path<'_>) -> Vec<Finding> {
     let stretches = CameraId::ALL.into_iter().zip(&columns);
     stretches
         .filter_map(|(camera, own)| {
-            let (from, to) = longest_stretch(own)?;
-            let fixed = own.get(from..to)?;
+            let fixed = own.get(longest_stretch(own)?)?;
             let evidence = Evidence::FixedStretch {
                 camera,
                 first: fixed.first()?.0,
@@ -104,34 +106,17 @@ fn scatter(values: Vec<f64>) -> Option<(f64, f64)> {
     Some((middle, distance))
 }
 
-/// The longest stretch on one column whose presses have different angles: the maximum sum of consecutive presses, where one
-/// on the column counts 1 and one elsewhere -[`ELSEWHERE`]. First index, and the one after the last.
-fn longest_stretch(columns: &Columns) -> Option<(usize, usize)> {
+/// The stretch that prevails on one column, and whose presses have different angles.
+fn longest_stretch(columns: &Columns) -> Option<Range<usize>> {
     let least = MIN_PRESSES.max((MIN_SHARE * columns.len() as f64).ceil() as usize) as i64;
     let candidates = distinct(columns.iter().map(|c| libm::round(c.1) as i64));
     let stretches = candidates.into_iter().filter_map(|column| {
-        let (sum, from, to) = stretch_on(columns, column as f64);
-        let (_, angle_deg) = scatter(columns[from..to].iter().map(|c| c.2).collect())?;
-        (sum >= least && angle_deg > MIN_SPREAD_DEG).then_some((sum, from, to))
+        let at = columns
+            .iter()
+            .map(|c| (c.1 - column as f64).abs() < FIXED_PX);
+        let (sum, stretch) = prevailing(at, ELSEWHERE);
+        let (_, angle_deg) = scatter(columns[stretch.clone()].iter().map(|c| c.2).collect())?;
+        (sum >= least && angle_deg > MIN_SPREAD_DEG).then_some((sum, stretch))
     });
-    let (_, from, to) = stretches.max_by_key(|s| s.0)?;
-    Some((from, to))
-}
-
-/// The maximum sum on `column`, with its range.
-fn stretch_on(columns: &Columns, column: f64) -> (i64, usize, usize) {
-    let (mut best, mut sum, mut from) = ((0, 0, 0), 0, 0);
-    for (i, (_, at, _)) in columns.iter().enumerate() {
-        sum += if (at - column).abs() < FIXED_PX {
-            1
-        } else {
-            -ELSEWHERE
-        };
-        if sum <= 0 {
-            (sum, from) = (0, i + 1);
-        } else if sum > best.0 {
-            best = (sum, from, i + 1);
-        }
-    }
-    best
+    Some(stretches.max_by_key(|s| s.0)?.1)
 }

@@ -13,7 +13,7 @@ use super::observed_press::ObservedPress;
 use super::permuted::permuted_rows;
 use super::readings::{MIN_SPREAD_DEG, Path, Reading, ScoredReading, scatter_deg};
 use super::rearranged::{MIN_GAIN, RearrangedRows, rearranged_rows};
-use super::resection::{residuals, spread_deg};
+use super::resection::{MAX_PLACES, residuals, spread_deg};
 use super::scale::stretched;
 use super::segments::{ShiftedSegment, locally_shifted_segment, shifted_segment};
 use super::statistics::median;
@@ -23,6 +23,9 @@ use crate::result::{Analysis, Evidence, Fault, Finding, Law};
 const MIN_PLACES: usize = 3;
 /// A reading must be this much likelier than the session as recorded, nats: 3000 to 1, because about forty are compared.
 const CLEARLY: f64 = 8.0;
+/// And a displaced list so much per location that counts, nats: residuals a quarter smaller in both cameras. What a skin bends in one place
+/// it bends beside it too, as if the list were elsewhere.
+const DISPLACED_PER_PLACE: f64 = 0.6;
 /// Streams follow the presses if their residual is below this share of the ignorance residual.
 const FOLLOWS: f64 = 1.0 / 3.0;
 /// They do not follow if it is above this share.
@@ -155,7 +158,12 @@ fn likelier<'a>(
         .filter(|j| !reorders(j) || path.moved_presses_prefer(than, j))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     let fault = best.reading.fault?;
-    (than.cost - best.cost > CLEARLY).then_some((fault, best))
+    let per_place = match fault {
+        Fault::PositionsDisplaced => DISPLACED_PER_PLACE,
+        _ => 0.0,
+    };
+    let least = CLEARLY.max(per_place * MAX_PLACES.min(path.places as f64));
+    (than.cost - best.cost > least).then_some((fault, best))
 }
 
 /// The session as recorded has this fault: another reading explains it.

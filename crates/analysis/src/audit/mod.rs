@@ -31,6 +31,7 @@ mod repetitions;
 mod resection;
 mod scale;
 mod segments;
+mod slow;
 mod statistics;
 mod whole_presses;
 

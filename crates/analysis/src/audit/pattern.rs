@@ -6,6 +6,7 @@ use skinrig_model::PressRole;
 
 use super::finding::finding;
 use super::observed_press::ObservedPress;
+use super::slow::burst_delay_s;
 use crate::result::{Evidence, Fault, Finding, Law};
 
 /// A contact this close to a listed one matches it, s.
@@ -36,16 +37,21 @@ pub(super) fn findings(
         return Vec::new();
     };
     let near = |at: f64, all: &[f64], within: f64| all.iter().any(|l| (l - at).abs() <= within);
+    let delay_s = burst_delay_s(presses_seen);
+    // Seconds from a press to a burst of it.
+    let burst_of = -NEAR_S..=delay_s + NEAR_S;
+    let has_press = |at: f64| listed.iter().any(|l| burst_of.contains(&(at - l)));
+    let has_burst = |l: f64, bursts: &[f64]| bursts.iter().any(|at| burst_of.contains(&(at - l)));
     let [one, two] = contacts_s;
     let by_both: Vec<f64> = one
         .iter()
         .copied()
-        .filter(|at| near(*at, two, TOGETHER_S))
+        .filter(|at| near(*at, two, TOGETHER_S + delay_s))
         .collect();
     let unlisted: Vec<f64> = by_both
         .iter()
         .copied()
-        .filter(|at| !near(*at, &listed, NEAR_S))
+        .filter(|at| !has_press(*at))
         .collect();
     let (begin, end) = match (sync.first(), sync.last()) {
         (Some(a), Some(b)) => (*a, *b),
@@ -57,15 +63,16 @@ pub(super) fn findings(
     let offsets_s = by_both.iter().filter(of_sync).map(|at| at - first);
     let unseen = sync
         .iter()
-        .filter(|at| !near(**at, &by_both, NEAR_S))
-        .filter(|at| [one, two].iter().all(|all| !near(**at, all, NEAR_S)));
+        .filter(|at| !has_burst(**at, &by_both))
+        .filter(|at| [one, two].iter().all(|all| !has_burst(**at, all)));
     let (more, fewer) = (unlisted.iter().filter(of_sync).count(), unseen.count());
     // Cameras that had begun would have seen the first sync press.
     let begin_is_recorded = begun_s
         .iter()
         .all(|at| at.is_some_and(|at| at < begin - NEAR_S));
-    let any_is_seen = sync.iter().any(|at| near(*at, &by_both, NEAR_S));
-    let is_recorded = (begin_is_recorded && any_is_seen) || contacts_before(contacts_s, begin);
+    let any_is_seen = sync.iter().any(|at| has_burst(*at, &by_both));
+    let is_recorded =
+        (begin_is_recorded && any_is_seen) || contacts_before(contacts_s, begin + delay_s);
     let mut found = Vec::new();
     if more > 0 || (fewer > 0 && is_recorded) {
         let evidence = Evidence::SyncTimes {

@@ -16,7 +16,7 @@ const PARAMETERS: usize = 5;
 /// coordinate (rms of four), 1.7 degrees of skew and 0.13 in W; slightly larger values tolerate a hastily measured rig.
 const PRIOR: [f64; PARAMETERS] = [5.0, 5.0, 2.5, 0.2, 0.05];
 /// Maximum number of independent locations: errors of a skin are correlated between neighbours.
-const MAX_PLACES: f64 = 25.0;
+pub(super) const MAX_PLACES: f64 = 25.0;
 /// Lower bound of the angle uncertainty, degrees: half a degree is 5 columns.
 pub(super) const MIN_SPREAD_DEG: f64 = 0.5;
 /// Standard deviation of a normal distribution divided by its median absolute value.

@@ -12,6 +12,7 @@ use skinrig_model::CameraId;
 
 use super::finding::finding;
 use super::observed_press::ObservedPress;
+use super::slow::burst_delay_s;
 use crate::result::{Evidence, Fault, Finding, Law};
 
 /// A contact this close to a press belongs to it, s.
@@ -45,10 +46,11 @@ pub(super) fn findings(
         .filter_map(|t| Some(t.timing?.contact.as_secs_f64()))
         .collect();
     listed.sort_by(f64::total_cmp);
+    let delay_s = burst_delay_s(presses_seen);
     let of = |camera: CameraId| {
         let contacts = contacts_s[camera.index()];
-        let best = likelier_shift(&listed, contacts)?;
-        let here = explained(&listed, contacts, 0.0);
+        let best = likelier_shift(&listed, contacts, delay_s)?;
+        let here = explained(&listed, contacts, 0.0, delay_s);
         let evidence = Evidence::ShiftedBursts {
             camera,
             presses: listed.len(),
@@ -82,14 +84,15 @@ struct Shift {
     gain: f64,
 }
 
-/// The likeliest shift, if it is clearly likelier than none.
-fn likelier_shift(listed: &[f64], contacts: &[f64]) -> Option<Shift> {
+/// The likeliest shift, if it is clearly likelier than none. Presses may burst up to `delay_s` after their contact; another shift
+/// explains only those that burst at once.
+fn likelier_shift(listed: &[f64], contacts: &[f64], delay_s: f64) -> Option<Shift> {
     let n = listed.len();
     if n < MIN_PRESSES || contacts.len() < MIN_PRESSES {
         return None;
     }
     let reach = MAX_SHIFT_PRESSES.max((MAX_SHIFT_SHARE * n as f64) as usize);
-    let unshifted = explained(listed, contacts, 0.0);
+    let unshifted = explained(listed, contacts, 0.0, delay_s);
     let proposing = (0..PROPOSING).chain(n - PROPOSING..n);
     let proposals = proposing.flat_map(|press| {
         let nearest = contacts.partition_point(|c| *c < listed[press]);
@@ -100,8 +103,9 @@ fn likelier_shift(listed: &[f64], contacts: &[f64]) -> Option<Shift> {
         contacts[from..to].iter().map(move |c| c - listed[press])
     });
     // Both counts change by what is explained more: so many more presses have a burst, and so many more bursts a press.
-    let judged = proposals.filter(|s| s.abs() >= MIN_SHIFT_S).map(|shift_s| {
-        let explained = explained(listed, contacts, shift_s);
+    let least_s = MIN_SHIFT_S.max(delay_s + NEAR_S);
+    let judged = proposals.filter(|s| s.abs() >= least_s).map(|shift_s| {
+        let explained = explained(listed, contacts, shift_s, 0.0);
         Shift {
             shift_s,
             explained,
@@ -113,13 +117,13 @@ fn likelier_shift(listed: &[f64], contacts: &[f64]) -> Option<Shift> {
     (many && best.gain > CLEARLY).then_some(best)
 }
 
-/// Presses with a contact of their own after `shift_s`.
-fn explained(listed: &[f64], contacts: &[f64], shift_s: f64) -> usize {
+/// Presses with a burst of their own after `shift_s`, or up to `delay_s` later.
+fn explained(listed: &[f64], contacts: &[f64], shift_s: f64, delay_s: f64) -> usize {
     let mut rest = contacts.iter().peekable();
     let has_its_own = |press: &&f64| {
         let at = **press + shift_s;
         while rest.next_if(|c| **c < at - NEAR_S).is_some() {}
-        rest.next_if(|c| **c <= at + NEAR_S).is_some()
+        rest.next_if(|c| **c <= at + delay_s + NEAR_S).is_some()
     };
     listed.iter().filter(has_its_own).count()
 }
@@ -139,7 +143,7 @@ mod tests {
             let listed = path(n);
             for presses in [-3, -2, -1, 1, 2, 3] {
                 let by_s = 2.0 * f64::from(presses);
-                let found = likelier_shift(&listed, &moved(&listed, by_s)).expect("is found");
+                let found = likelier_shift(&listed, &moved(&listed, by_s), 0.0).expect("is found");
                 assert!(
                     (found.shift_s - by_s).abs() < 1e-9,
                     "{n} {presses} {found:?}"
@@ -152,9 +156,29 @@ mod tests {
     #[test]
     fn one_press_without_sync_presses_is_not_enough() {
         let listed = &path(50)[3..];
-        assert_eq!(likelier_shift(listed, &moved(listed, 2.0)), None);
-        let found = likelier_shift(listed, &moved(listed, 6.0)).expect("is found");
+        assert_eq!(likelier_shift(listed, &moved(listed, 2.0), 0.0), None);
+        let found = likelier_shift(listed, &moved(listed, 6.0), 0.0).expect("is found");
         assert!((found.shift_s - 6.0).abs() < 1e-9, "{found:?}");
+    }
+
+    /// Slow tips: bursts come when the tip has gone deep enough, or when it leaves, in each press at another time.
+    #[test]
+    fn late_bursts_of_slow_presses_are_no_shift_but_whole_presses_are() {
+        let listed = path(50);
+        let late = |i: usize| {
+            if i % 3 == 0 {
+                0.95
+            } else {
+                0.2 + 0.1 * (i % 4) as f64
+            }
+        };
+        let bursts = |by_s: f64| -> Vec<f64> {
+            let at = |(i, t): (usize, &f64)| t + late(i) + by_s;
+            listed.iter().enumerate().map(at).collect()
+        };
+        assert_eq!(likelier_shift(&listed, &bursts(0.0), 0.9), None);
+        assert!(likelier_shift(&listed, &moved(&listed, 4.0), 0.9).is_some());
+        assert!(likelier_shift(&listed, &bursts(0.0), 0.0).is_some());
     }
 
     #[test]
@@ -170,7 +194,7 @@ mod tests {
             contacts.extend((0..20).map(|i| 1.3 + 4.7 * f64::from(i)));
             contacts.sort_by(f64::total_cmp);
             assert_eq!(
-                likelier_shift(&listed, &contacts),
+                likelier_shift(&listed, &contacts, 0.0),
                 None,
                 "every {missing}th"
             );
@@ -181,9 +205,9 @@ mod tests {
             .into_iter()
             .chain(moved(&listed[..4], -26.75))
             .collect();
-        assert_eq!(likelier_shift(&listed, &few), None);
-        assert_eq!(likelier_shift(&listed, &[]), None);
-        assert_eq!(likelier_shift(&listed, &listed[..30]), None);
-        assert_eq!(likelier_shift(&listed, &listed[20..]), None);
+        assert_eq!(likelier_shift(&listed, &few, 0.0), None);
+        assert_eq!(likelier_shift(&listed, &[], 0.0), None);
+        assert_eq!(likelier_shift(&listed, &listed[..30], 0.0), None);
+        assert_eq!(likelier_shift(&listed, &listed[20..], 0.0), None);
     }
 }

@@ -16,6 +16,7 @@ impl WarningCause {
                 | Self::UnsuitableSettings { .. }
                 | Self::UnusedSetting { .. }
                 | Self::RepeatedPositions { .. }
+                | Self::RepeatedEvents(_)
                 | Self::FewDecide { .. }
                 | Self::LeftOutUnknown { .. }
                 | Self::LocatorUnfit { .. }

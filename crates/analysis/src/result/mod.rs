@@ -24,6 +24,7 @@ mod quiet_part;
 mod recalibration;
 mod reduction;
 mod reference;
+mod repeated_events;
 mod termination;
 #[cfg(test)]
 mod tests;
@@ -69,6 +70,7 @@ pub use quiet_part::QuietPart;
 pub use recalibration::{CameraMove, EarlierSession, Move, Recalibration, RemountPart};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
+pub use repeated_events::RepeatedEvents;
 pub use termination::Termination;
 pub use violation::AlignmentViolation;
 pub use warning::{Warning, WarningCause};
@@ -93,7 +95,7 @@ use crate::rule::Rule;
 /// reached. Version 29: positions in another scale are also found about their middle, and unused settings are named. Version 30: so are
 /// lists of presses in any other order. Version 31: touches felt while recording have depths. Version 32: parts
 /// of the picture without events are named.
-pub const ANALYSIS_VERSION: u32 = 32;
+pub const ANALYSIS_VERSION: u32 = 33;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

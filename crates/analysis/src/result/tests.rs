@@ -405,6 +405,12 @@ fn of_results() -> Vec<(Value, &'static str)> {
              whether their rows of the press list are right, and at their events",
         ),
         (
+            json!({"camera": "camera1", "kind": "repeated_events", "share": 0.24, "from_s": 112.4}),
+            "camera 1: 24 % of the events are those of an earlier time once more, pixel by pixel and to the microsecond, first 112 s \
+             into the camera's time: no press repeats another one so, and the scatter between repetitions is too small; find out whether \
+             driver, buffer or converter sent data twice, and record again",
+        ),
+        (
             json!({"camera": "camera1", "kind": "quiet_part", "columns": [320, 639], "rows": null, "polarity": null,
                    "presses": [64, 127], "share": 0.0}),
             "camera 1: events of columns 320 to 639 fall to 0 % of their usual number between presses, from press 64 to press 127: find \
