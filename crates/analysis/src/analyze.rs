@@ -26,7 +26,9 @@ use crate::result::{
 };
 use crate::session_base::time_base;
 use crate::sets::ScoreSet;
-use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
+use crate::{
+    audit, bit_rates, caveats, changes, check, cmre, coverage, latency, legs, reduction, verdict,
+};
 
 /// Analyses a session. The first pass over a camera's events finds event rates and, where its clock is known before, hot pixels; the
 /// last one fills the press windows. Both cameras run in parallel. Later passes use cached events of the crop. Each reads
@@ -341,6 +343,8 @@ fn evaluate(
     analysis.reduction = reduction::study(analysis, &locator, kept);
     analysis.latency = latency::study(analysis, kept);
     analysis.warnings.extend(caveats::caveats(analysis));
+    let changes = changes::changes(analysis, input, &streams.bursts);
+    analysis.warnings.extend(changes);
     Ok(())
 }
 

@@ -18,6 +18,8 @@ pub(crate) struct PressBurst {
     pub idle_events: f64,
     /// 0 if no idle time is free.
     pub idle_s: f64,
+    /// From the contact to the middle event above the idle rate, ms; `None` without such events.
+    pub delay_ms: Option<f64>,
 }
 
 impl PressBurst {
@@ -25,6 +27,12 @@ impl PressBurst {
     pub(crate) fn rates(&self) -> Option<(f64, f64)> {
         let known = self.press_s > 0.0 && self.idle_s > 0.0;
         known.then(|| (self.events / self.press_s, self.idle_events / self.idle_s))
+    }
+
+    /// Events above the idle prediction, if that is known.
+    pub(crate) fn excess(&self) -> Option<f64> {
+        let (_, idle_per_s) = self.rates()?;
+        Some(self.events - idle_per_s * self.press_s)
     }
 
     /// Events above the idle prediction, in standard errors; `None` if there are events but no idle time.
@@ -48,34 +56,60 @@ pub(crate) fn press_bursts(
     clock: &ClockFit,
 ) -> Vec<Option<PressBurst>> {
     let mut bursts = vec![None; input.planned.len()];
-    for window in windows(
-        timings(input),
-        &input.earlier,
-        clock,
-        &AnalysisSettings::default(),
-    ) {
-        let (events, press_s) = counted(rates, window.start_us, window.end_us);
-        let (idle_events, idle_s) = counted(rates, window.idle_start_us, window.start_us);
+    let default = AnalysisSettings::default();
+    for window in windows(timings(input), &input.earlier, clock, &default) {
+        let (bins, press_s) = counted(rates, window.start_us, window.end_us);
+        let (idle_bins, idle_s) = counted(rates, window.idle_start_us, window.start_us);
+        let (events, idle_events) = (total(bins), total(idle_bins));
+        let timing = input.outcomes[window.row].as_ref().and_then(|o| o.timing);
+        let contact_us = timing.map(|t| clock.camera_us_of_host(t.contact));
+        let bin_s = rates.bin_us() as f64 * 1e-6;
+        let middle_s = middle(bins, idle_events / idle_s * bin_s).map(|bins| bins * bin_s);
+        let delay_s = |contact_us: f64| {
+            Some(
+                window.start_us.max(rates.start_us()) as f64 * 1e-6 + middle_s? - contact_us * 1e-6,
+            )
+        };
         bursts[window.row] = Some(PressBurst {
             events,
             press_s,
             idle_events,
             idle_s,
+            delay_ms: contact_us.and_then(delay_s).map(|s| 1e3 * s),
         });
     }
     bursts
 }
 
-/// Events in the bins whose middle lies between two times, and the length of these bins, s.
-fn counted(rates: &RateHistogram, from_us: u64, to_us: u64) -> (f64, f64) {
+fn total(bins: &[u32]) -> f64 {
+    bins.iter().map(|count| f64::from(*count)).sum()
+}
+
+/// Where half of the events above the idle rate of a bin have come, in bins; `None` if that rate is not known, or nothing is above it.
+fn middle(bins: &[u32], idle_per_bin: f64) -> Option<f64> {
+    let half = (total(bins) - idle_per_bin * bins.len() as f64) / 2.0;
+    if half.is_nan() || half <= 0.0 {
+        return None;
+    }
+    let mut sum = 0.0;
+    bins.iter().zip(0..).find_map(|(count, bin)| {
+        let more = f64::from(*count) - idle_per_bin;
+        let reaches = sum + more >= half;
+        let at = f64::from(bin) + (half - sum) / more;
+        sum += more;
+        reaches.then_some(at)
+    })
+}
+
+/// The bins whose middle lies between two times, and their length, s. Those before the first and after the last event are missing, as silent.
+fn counted(rates: &RateHistogram, from_us: u64, to_us: u64) -> (&[u32], f64) {
     let bin_us = rates.bin_us();
     let bin = |us: u64| (us + bin_us / 2) / bin_us;
     let (from, to) = (bin(from_us), bin(to_us).max(bin(from_us)));
     let first = rates.start_us() / bin_us;
     let clip = |bin: u64| (bin.saturating_sub(first) as usize).min(rates.counts().len());
-    let events = rates.counts()[clip(from)..clip(to)].iter();
     let seconds = ((to - from) * bin_us) as f64 / 1e6;
-    (events.map(|c| f64::from(*c)).sum(), seconds)
+    (&rates.counts()[clip(from)..clip(to)], seconds)
 }
 
 #[cfg(test)]
@@ -88,13 +122,26 @@ mod tests {
         for ms in 1_000..2_000 {
             rates.add(1_000 * ms);
         }
-        assert_eq!(counted(&rates, 1_100_000, 1_300_000), (200.0, 0.2));
-        assert_eq!(counted(&rates, 1_104_000, 1_296_000), (200.0, 0.2));
+        let counts = |rates: &RateHistogram, from_us, to_us| {
+            let (bins, seconds) = counted(rates, from_us, to_us);
+            (total(bins), seconds)
+        };
+        assert_eq!(counts(&rates, 1_100_000, 1_300_000), (200.0, 0.2));
+        assert_eq!(counts(&rates, 1_104_000, 1_296_000), (200.0, 0.2));
         // Time before the first and after the last event counts as silent.
-        assert_eq!(counted(&rates, 0, 1_050_000), (50.0, 1.05));
-        assert_eq!(counted(&rates, 1_950_000, 2_500_000), (50.0, 0.55));
-        assert_eq!(counted(&rates, 1_300_000, 1_300_000), (0.0, 0.0));
-        assert_eq!(counted(&RateHistogram::new(10_000), 0, 20_000), (0.0, 0.02));
+        assert_eq!(counts(&rates, 0, 1_050_000), (50.0, 1.05));
+        assert_eq!(counts(&rates, 1_950_000, 2_500_000), (50.0, 0.55));
+        assert_eq!(counts(&rates, 1_300_000, 1_300_000), (0.0, 0.0));
+        assert_eq!(counts(&RateHistogram::new(10_000), 0, 20_000), (0.0, 0.02));
+    }
+
+    #[test]
+    fn the_middle_is_where_half_of_what_the_press_added_has_come() {
+        assert_eq!(middle(&[2, 2, 12, 12, 2], 2.0), Some(3.0));
+        assert_eq!(middle(&[2, 2, 22, 2, 2], 2.0), Some(2.5));
+        assert_eq!(middle(&[2, 2, 2], 2.0), None);
+        assert_eq!(middle(&[2, 2, 2], f64::NAN), None);
+        assert_eq!(middle(&[], 0.0), None);
     }
 
     #[test]
@@ -104,6 +151,7 @@ mod tests {
             press_s: 0.5,
             idle_events,
             idle_s,
+            delay_ms: None,
         };
         // Expected 100 events, variance 100 (1 + 1) + 1.
         let response = burst(400.0, 100.0, 0.5).response().unwrap();

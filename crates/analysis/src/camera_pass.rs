@@ -5,6 +5,7 @@ use skinrig_model::CameraId;
 use crate::accumulate::{Accumulator, PassOutput, PassRequest, SLACK_US, pass};
 use crate::bursts::{PressBurst, press_bursts};
 use crate::camera_clocks::CameraClock;
+use crate::ceiling::ceiling;
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
 use crate::event_cache::EventCache;
@@ -133,7 +134,8 @@ pub(crate) fn camera_pass(
         };
         let quiet = pixels.quiet(|window| input.planned[list[window].row].id);
         warnings.extend(quiet.into_iter().map(WarningCause::QuietPart));
-        warnings.extend(pixels.repeated().map(WarningCause::RepeatedEvents));
+        let faults = pixels.readout_faults();
+        warnings.extend(faults.into_iter().map(WarningCause::Readout));
         hot_pixels = pixels.hot(settings);
         // Where only hot pixels fire, the camera is silent.
         let any_hot = !hot_pixels.pixels.is_empty();
@@ -165,6 +167,10 @@ pub(crate) fn camera_pass(
         let OffSensor { events, of } = off_sensor;
         warnings.push(WarningCause::EventsOffSensor { events, of });
     }
+    let of_window = |window: usize| input.planned[list[window].row].id;
+    let fixed = collected.rates.as_ref().map(CameraRates::fixed);
+    let ceiling = fixed.and_then(|rates| ceiling(rates, &list, of_window));
+    warnings.extend(ceiling.map(WarningCause::Readout));
     let found = stream(input, collected.rates.as_ref(), clock.as_ref());
     let lost = [&input.gaps[k][..], &found.silences.spans()].concat();
     let series = collected

@@ -6,13 +6,15 @@
 
 use skinrig_model::{AnalysisSettings, CdEvent, PressId, SENSOR_WIDTH};
 
+use crate::crowded::{crowded, without_busiest};
 use crate::pixels::PixelSet;
 use crate::quiet_parts::{
     Fired, IdleTime, empty_run, missing_polarity, quiet_for_a_time, side_of, strip_of,
 };
 use crate::repeats::Repeats;
-use crate::result::{HotPixels, QuietPart, RepeatedEvents};
+use crate::result::{HotPixels, QuietPart, ReadoutFault};
 use crate::segment::Window;
+use crate::stamp_steps::StampSteps;
 
 /// Idle times in which a hot pixel fires, at least; and as a share of all.
 const LEAST_SPANS: u32 = 4;
@@ -53,6 +55,7 @@ pub(crate) struct PixelCounts {
     /// Pixels that fired, by number of the idle time.
     fired: Vec<Fired>,
     repeats: Repeats,
+    stamps: StampSteps,
 }
 
 impl PixelCounts {
@@ -83,6 +86,7 @@ impl PixelCounts {
             at: 0,
             fired: vec![Fired::default(); windows.len()],
             repeats: Repeats::new(),
+            stamps: StampSteps::default(),
             pixels: vec![Pixel::default(); height * usize::from(SENSOR_WIDTH)],
         }
     }
@@ -95,6 +99,7 @@ impl PixelCounts {
                 continue;
             }
             self.repeats.push(event);
+            self.stamps.push(event.t_us);
             if !self.reach(event.t_us) {
                 continue;
             }
@@ -125,9 +130,28 @@ impl PixelCounts {
         self.spans.get(self.at).is_some_and(holds)
     }
 
-    /// Events of the crop that come once more.
-    pub(crate) fn repeated(&self) -> Option<RepeatedEvents> {
-        self.repeats.found()
+    /// What the events of the crop tell of readout, driver and converter.
+    pub(crate) fn readout_faults(&self) -> Vec<ReadoutFault> {
+        let width = usize::from(SENSOR_WIDTH);
+        let events = |pixel: &Pixel| u64::from(pixel.idle_events) + u64::from(pixel.press_events);
+        let column = |x: usize| self.pixels[x..].iter().step_by(width).map(events);
+        let columns: Vec<u64> = (0..width)
+            .map(|x| without_busiest(column(x).collect()))
+            .collect();
+        let rows = self.pixels.chunks(width);
+        let rows: Vec<u64> = rows
+            .map(|row| without_busiest(row.iter().map(events).collect()))
+            .collect();
+        let column = crowded(&columns).map(|(x, times)| ReadoutFault::CrowdedColumn {
+            column: x as u16,
+            times,
+        });
+        let row = crowded(&rows).map(|(y, times)| ReadoutFault::CrowdedRow {
+            row: self.rows.0 + y as u16,
+            times,
+        });
+        let found = [self.repeats.found(), self.stamps.found(), column, row];
+        found.into_iter().flatten().collect()
     }
 
     /// Parts of the picture that are quiet, during a part of the session or throughout. `press`: of each window.

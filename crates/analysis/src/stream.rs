@@ -182,6 +182,7 @@ mod tests {
             press_s: 0.5,
             idle_events: idle_per_s,
             idle_s: 1.0,
+            delay_ms: None,
         }); 3]
     }
 

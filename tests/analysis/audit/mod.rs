@@ -2,13 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod cameras;
 mod rigs;
 mod rows;
 mod skins;
 
 use rayon::prelude::*;
 use rigs::{Random, Session, SessionOptions, session, sound};
-use skinrig_analysis::result::{Evidence, Fault, Finding, QuietPart, Warning, WarningCause};
+use skinrig_analysis::result::{Evidence, Fault, Finding, Warning, WarningCause};
 use skinrig_analysis::{Analysis, SessionInput, analyze};
 use skinrig_model::{
     AnalysisSettings, Causes, HostTime, InvalidReason, Point2, PressFault, PressRole, PressVerdict,
@@ -342,31 +343,6 @@ fn a_camera_that_sticks_on_a_hot_pixel_is_silent() {
             );
         }
     }
-}
-
-/// A part of a camera's picture dies half-way. No sound session is said to have such a part.
-#[test]
-fn a_part_of_the_picture_that_dies_is_named() {
-    let long = SessionOptions {
-        places: 20,
-        ..SessionOptions::default()
-    };
-    let part = |w: Warning| match w.cause {
-        WarningCause::QuietPart(part) => Some(part),
-        _ => None,
-    };
-    let quiet =
-        |s: &Session| -> Vec<QuietPart> { run(s).warnings.into_iter().filter_map(part).collect() };
-    (0..SEEDS).into_par_iter().for_each(|seed| {
-        let mut s = session(seed, long);
-        assert_eq!(quiet(&s), [], "seed {seed}");
-        let events = &mut s.events.events[0];
-        let half_us = events[events.len() / 2].t_us;
-        events.retain(|e| e.t_us < half_us || e.x < 320);
-        let found = quiet(&s);
-        let is_named = |q: &QuietPart| q.columns == Some((320, 639)) && q.presses.is_some();
-        assert!(found.iter().any(is_named), "seed {seed}: {found:?}");
-    });
 }
 
 /// A camera's clock steps half-way: the step is named, and no such session is valid.

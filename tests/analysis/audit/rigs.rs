@@ -59,6 +59,8 @@ pub(crate) struct SessionOptions {
     pub places: usize,
     /// Amplitude of an error of the skin that bends slowly over it, columns.
     pub bent_px: f64,
+    /// The same of an error in waves of 13 cm, whose direction and phase depend on the seed, columns.
+    pub wavy_px: f64,
     /// Share of the session after which camera 2 sees the next press of the path instead.
     pub early_from: Option<f64>,
     /// Number of repetitions (0: from the seed).
@@ -242,6 +244,7 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
                 at
             };
             let bent = wishes.bent_px * (0.09 * at.x_mm + k as f64).sin() * (0.07 * at.y_mm).cos();
+            let wave = wave(seed, k, at);
             let Some(u) = truth.cameras[k].column_of_point(at) else {
                 continue;
             };
@@ -256,6 +259,7 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
             };
             let missed = role != PressRole::Sync && random.unit() < miss;
             let skin = uneven[location as usize][k];
+            let bent = bent + wishes.wavy_px * wave;
             let centre = u + moved + skin + bent + 3.0 * random.normal();
             for n in 0..if missed { 0 } else { strength } {
                 let after = if 3 * n < 2 * strength {
@@ -303,6 +307,13 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
             slice: 4096,
         },
     }
+}
+
+/// Height of a wave across the skin as a camera sees it, -1 to 1.
+fn wave(seed: u64, camera: usize, at: Point2) -> f64 {
+    let seed = seed as f64;
+    let along_mm = at.x_mm * seed.sin() + at.y_mm * seed.cos();
+    (0.05 * along_mm + 1.7 * seed + 3.0 * camera as f64 * (3.1 * seed).sin()).sin()
 }
 
 /// The executed press: slightly late, slightly off its location.

@@ -77,7 +77,7 @@ fn same_position(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option
 
 fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<Finding> {
     let mut first: BTreeMap<(LocationId, u64), (RepetitionId, f64)> = BTreeMap::new();
-    let mut moves: BTreeMap<RepetitionId, Vec<f64>> = BTreeMap::new();
+    let mut moves: BTreeMap<RepetitionId, Vec<(f64, f64)>> = BTreeMap::new();
     for touch in presses_seen.iter().filter(|t| t.role != PressRole::Sync) {
         let Some(column) = touch.sights[camera.index()].column else {
             continue;
@@ -89,13 +89,14 @@ fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<
             moves
                 .entry(touch.repetition)
                 .or_default()
-                .push(column - before);
+                .push((before, column - before));
         }
     }
     let columns: Vec<f64> = first.values().map(|(_, column)| *column).collect();
     let middle = median(columns.clone())?;
     let between = median(columns.iter().map(|c| (c - middle).abs()).collect())?;
-    for (repetition, moves) in &moves {
+    for (repetition, pairs) in &moves {
+        let moves: Vec<f64> = pairs.iter().map(|pair| pair.1).collect();
         let n = moves.len();
         if n < MIN_PAIRS {
             continue;
@@ -103,12 +104,14 @@ fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<
         let moved = median(moves.clone())?;
         let scatter = median(moves.iter().map(|m| (m - moved).abs()).collect())?;
         let error = MEDIAN_ERROR * scatter / (n as f64).sqrt();
-        let matters = moved.abs() > SMALL_MOVE_PX && moved.abs() > SCATTERS * scatter;
-        if (moved.abs() > MIN_MOVE_PX || matters) && moved.abs() > SIGMAS * error {
+        let shifts = matters(moved, scatter) && moved.abs() > SIGMAS * error;
+        let shift = shifts.then_some((moved, error, None));
+        if let Some((moved_px, error_px, zoom_percent)) = shift.or_else(|| zoom(pairs)) {
             let evidence = Evidence::RepetitionMoved {
                 repetition: *repetition,
-                moved_px: moved,
-                error_px: error,
+                moved_px,
+                error_px,
+                zoom_percent,
                 camera,
                 pairs: n,
             };
@@ -140,4 +143,40 @@ fn disagreement(presses_seen: &[ObservedPress<'_>], camera: CameraId) -> Option<
         }
     }
     None
+}
+
+/// True if columns that move so far, with this scatter (median absolute deviation), decide the error.
+fn matters(moved_px: f64, scatter_px: f64) -> bool {
+    let moved = moved_px.abs();
+    moved > MIN_MOVE_PX || (moved > SMALL_MOVE_PX && moved > SCATTERS * scatter_px)
+}
+
+/// Moves that grow with the column, as those of a lens that was turned or of a camera that was moved along its axis: the largest move of a
+/// pressed column, its standard error, px, and the growth of distances, %. By the medians of both halves; `None` unless certain.
+fn zoom(pairs: &[(f64, f64)]) -> Option<(f64, f64, Option<f64>)> {
+    let mut sorted = pairs.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (left, right) = sorted.split_at(sorted.len() / 2);
+    if left.len() < MIN_PAIRS {
+        return None;
+    }
+    let middle = |half: &[(f64, f64)]| {
+        let of = |i: fn(&(f64, f64)) -> f64| median(half.iter().map(i).collect());
+        Some((of(|pair| pair.0)?, of(|pair| pair.1)?))
+    };
+    let ((left_u, left_move), (right_u, right_move)) = (middle(left)?, middle(right)?);
+    let slope = (right_move - left_move) / (right_u - left_u);
+    let fitted = |u: f64| left_move + slope * (u - left_u);
+    let off = sorted.iter().map(|(u, moved)| (moved - fitted(*u)).abs());
+    let scatter = median(off.collect())?;
+    let of_half = MEDIAN_ERROR * scatter / (left.len() as f64).sqrt();
+    let error = std::f64::consts::SQRT_2 * of_half;
+    let [first, last] = [sorted.first()?.0, sorted.last()?.0].map(fitted);
+    let moved = if first.abs() > last.abs() {
+        first
+    } else {
+        last
+    };
+    let certain = (right_move - left_move).abs() > SIGMAS * error;
+    (certain && matters(moved, scatter)).then_some((moved, error, Some(100.0 * slope)))
 }

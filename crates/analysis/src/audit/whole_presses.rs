@@ -166,7 +166,7 @@ mod tests {
     fn late_bursts_of_slow_presses_are_no_shift_but_whole_presses_are() {
         let listed = path(50);
         let late = |i: usize| {
-            if i % 3 == 0 {
+            if i.is_multiple_of(3) {
                 0.95
             } else {
                 0.2 + 0.1 * (i % 4) as f64

@@ -5,7 +5,7 @@ use skinrig_model::{CameraId, InvalidReason, PressId, RepetitionId};
 
 use super::evidence_parts::{
     FittingPlan, OnsetHeight, PeakForce, Response, SeenMarks, Silence, in_degrees, joined, noise,
-    times,
+    times, zoomed,
 };
 use super::other_reading::OtherReading;
 use crate::with_text::with_text;
@@ -482,15 +482,17 @@ pub enum Evidence {
     /// All centroids moved in a repetition.
     #[error(
         "expected centroids at the same columns in each repetition, found {repetition} moved by {moved_px:.1} ± \
-         {error_px:.1} px ({camera}, n {pairs})"
+         {error_px:.1} px{} ({camera}, n {pairs})", zoomed(*.zoom_percent)
     )]
     RepetitionMoved {
         /// The repetition.
         repetition: RepetitionId,
-        /// Median move, px.
+        /// Median move; of a zoom the move of the outermost column, px.
         moved_px: f64,
         /// Its standard error, px.
         error_px: f64,
+        /// Growth of the distance between two columns, %, if columns move the more, the farther from one they are.
+        zoom_percent: Option<f64>,
         /// The camera.
         camera: CameraId,
         /// Presses compared.

@@ -107,6 +107,12 @@ pub(super) fn times(all_s: &[f64]) -> String {
     texts.join(", ")
 }
 
+pub(super) fn zoomed(percent: Option<f64>) -> String {
+    percent.map_or_else(String::new, |percent| {
+        format!(" at an edge, by a zoom of {percent:+.1} %")
+    })
+}
+
 pub(super) fn noise(per_s: Option<[f64; 2]>) -> String {
     per_s.map_or_else(String::new, |[one, two]| {
         format!("; both cameras send noise ({one:.0} and {two:.0} events/s)")

@@ -230,10 +230,16 @@ fn of_positions() -> Vec<(Value, &'static str)> {
              10.0 s and 11.5 s (n 40 marks)",
         ),
         (
-            json!({"kind": "repetition_moved", "repetition": 2, "moved_px": 3.0, "error_px": 0.2,
+            json!({"kind": "repetition_moved", "repetition": 2, "moved_px": 3.0, "error_px": 0.2, "zoom_percent": null,
                 "camera": "camera1", "pairs": 25}),
             "expected centroids at the same columns in each repetition, found repetition 2 moved by 3.0 ± 0.2 px (camera 1, n \
              25)",
+        ),
+        (
+            json!({"kind": "repetition_moved", "repetition": 2, "moved_px": 12.0, "error_px": 0.8, "zoom_percent": -6.0,
+                "camera": "camera2", "pairs": 30}),
+            "expected centroids at the same columns in each repetition, found repetition 2 moved by 12.0 ± 0.8 px at an edge, by a zoom \
+             of -6.0 % (camera 2, n 30)",
         ),
         (
             json!({"kind": "repetition_elsewhere", "repetition": 2, "off_px": 60.0, "between_px": 80.0,

@@ -16,7 +16,8 @@ impl WarningCause {
                 | Self::UnsuitableSettings { .. }
                 | Self::UnusedSetting { .. }
                 | Self::RepeatedPositions { .. }
-                | Self::RepeatedEvents(_)
+                | Self::CameraChanged(_)
+                | Self::Readout(_)
                 | Self::FewDecide { .. }
                 | Self::LeftOutUnknown { .. }
                 | Self::LocatorUnfit { .. }

@@ -3,6 +3,7 @@
 mod alignment;
 mod audit;
 mod calibration;
+mod camera_change;
 mod campaign;
 mod clock_map;
 mod common_exclusion;
@@ -21,10 +22,10 @@ mod motion;
 mod other_reading;
 mod paired_test;
 mod quiet_part;
+mod readout_fault;
 mod recalibration;
 mod reduction;
 mod reference;
-mod repeated_events;
 mod termination;
 #[cfg(test)]
 mod tests;
@@ -39,6 +40,7 @@ pub use alignment::{
 };
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
+pub use camera_change::{CameraChange, Changed};
 pub use campaign::CampaignLooks;
 pub use clock_map::{ClockMap, MapName};
 pub use common_exclusion::CommonExclusion;
@@ -67,10 +69,10 @@ pub use other_reading::OtherReading;
 pub(crate) use other_reading::{Corner, FrameChange, Origin, OtherPlan, Turn};
 pub use paired_test::PairedTest;
 pub use quiet_part::QuietPart;
+pub use readout_fault::ReadoutFault;
 pub use recalibration::{CameraMove, EarlierSession, Move, Recalibration, RemountPart};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
-pub use repeated_events::RepeatedEvents;
 pub use termination::Termination;
 pub use violation::AlignmentViolation;
 pub use warning::{Warning, WarningCause};
@@ -85,16 +87,9 @@ use crate::exclusion::Exclusion;
 use crate::rule::Rule;
 
 /// Version of this layout and of the algorithms behind it; part of every result. Results of another version are not read,
-/// except their summary. Version 9: causes of presses are types. Version 10: warnings, violations
-/// and evidence are. Version 11: depth and force are estimated. Version 12: the fields of the locators
-/// end their search where the likelihood gains less than 0.001. Version 13: calibrations and located
-/// positions have at least nine correct digits where the problem is well posed. Version 14: so have held-out errors; the
-/// estimated depth treats ON and OFF alike, and intervals are wider for few locations. Version 16: a depth that presses stopped short of has no
-/// errors of its own. Version 19: a place that a plan lists again is one location. Version
-/// 20: a look needs half of the presses, and an open question is a warning. Version 24: the window of a long hold ends 1 s after the depth was
-/// reached. Version 29: positions in another scale are also found about their middle, and unused settings are named. Version 30: so are
-/// lists of presses in any other order. Version 31: touches felt while recording have depths. Version 32: parts
-/// of the picture without events are named.
+/// except their summary. Version 29: positions in another scale are also found about their middle, and unused settings are named. Version 30:
+/// so are lists of presses in any other order. Version 31: touches felt while recording have depths. Version 32: parts of the picture without
+/// events are named. Version 33: so are cameras that change, and faults of the readout; slow tips and bent skins are no faults.
 pub const ANALYSIS_VERSION: u32 = 33;
 
 /// The result of analysing one session.

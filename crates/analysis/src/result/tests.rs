@@ -405,10 +405,45 @@ fn of_results() -> Vec<(Value, &'static str)> {
              whether their rows of the press list are right, and at their events",
         ),
         (
-            json!({"camera": "camera1", "kind": "repeated_events", "share": 0.24, "from_s": 112.4}),
+            json!({"camera": "camera1", "kind": "readout", "fault": "events_again", "share": 0.24, "from_s": 112.4}),
             "camera 1: 24 % of the events are those of an earlier time once more, pixel by pixel and to the microsecond, first 112 s \
              into the camera's time: no press repeats another one so, and the scatter between repetitions is too small; find out whether \
              driver, buffer or converter sent data twice, and record again",
+        ),
+        (
+            json!({"camera": "camera2", "kind": "readout", "fault": "coarse_stamps", "step_ms": 20.0}),
+            "camera 2: timestamps come in steps of 20 ms, many events to each: no latency, onset or depth is known better; find out which \
+             driver or converter rounded them",
+        ),
+        (
+            json!({"camera": "camera2", "kind": "readout", "fault": "crowded_column", "column": 400, "times": 93.4}),
+            "camera 2: column 400 has 93 times the events of those beside it: a driver or converter may have written other columns as this \
+             one (expected 0 to 639), or its readout is broken",
+        ),
+        (
+            json!({"camera": "camera2", "kind": "readout", "fault": "crowded_row", "row": 300, "times": 93.4}),
+            "camera 2: row 300 has 93 times the events of those beside it: a driver or converter may have written other rows as this one \
+             (expected 0 to 479), or its readout is broken",
+        ),
+        (
+            json!({"camera": "camera2", "kind": "readout", "fault": "ceiling", "per_ms": 8.0, "presses": 18, "first": 64}),
+            "camera 2: the event rate stops at 8 events per ms in 18 presses, first press 64: readout or cable carry no more, and events were \
+             lost; lower the rate by a region of interest or the biases, and record again",
+        ),
+        (
+            json!({"camera": "camera1", "kind": "camera_changed", "what": "events", "from": 64, "before": 812.4, "after": 120.2, "places": 25}),
+            "camera 1: events of a press change from 812 to 120 from about press 64 on, at the same 25 places: find out what changed there, \
+             such as light, lens, bias, clock or skin, and record these presses again",
+        ),
+        (
+            json!({"camera": "camera1", "kind": "camera_changed", "what": "on_share", "from": 64, "before": 0.66, "after": 0.34, "places": 25}),
+            "camera 1: ON events change from 66 to 34 % of all from about press 64 on, at the same 25 places: find out what changed there, \
+             such as light, lens, bias, clock or skin, and record these presses again",
+        ),
+        (
+            json!({"camera": "camera1", "kind": "camera_changed", "what": "delay_ms", "from": 64, "before": 61.0, "after": 112.6, "places": 25}),
+            "camera 1: the middle event of a press comes 113 instead of 61 ms after the contact from about press 64 on, at the same 25 \
+             places: find out what changed there, such as light, lens, bias, clock or skin, and record these presses again",
         ),
         (
             json!({"camera": "camera1", "kind": "quiet_part", "columns": [320, 639], "rows": null, "polarity": null,

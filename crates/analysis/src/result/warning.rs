@@ -5,9 +5,10 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use skinrig_model::{CalibrationModel, CameraId, Locator, PressId, Reaction, StopQuestion};
 
+use super::camera_change::CameraChange;
 use super::common_exclusion::{CommonExclusion, most};
 use super::quiet_part::QuietPart;
-use super::repeated_events::RepeatedEvents;
+use super::readout_fault::ReadoutFault;
 use super::warning_words::{in_words, listed, share_of_crop};
 use super::{Estimate, Fault};
 use crate::clock::{MarksError, RatesError};
@@ -565,16 +566,15 @@ pub enum WarningCause {
         /// RMSE without these presses, mm.
         without_mm: f64,
     },
-    /// Events come once more.
-    #[error(
-        "{:.0} % of the events are those of an earlier time once more, pixel by pixel and to the microsecond, first {:.0} s into the camera's \
-         time: no press repeats another one so, and the scatter between repetitions is too small; find out whether driver, buffer or converter \
-         sent data twice, and record again", 100.0 * .0.share, .0.from_s
-    )]
-    RepeatedEvents(RepeatedEvents),
     /// A part of the picture is quiet.
     #[error("{0}")]
     QuietPart(QuietPart),
+    /// A camera gives something else from some press on.
+    #[error("{0}")]
+    CameraChanged(CameraChange),
+    /// Readout, driver or converter.
+    #[error("{0}")]
+    Readout(ReadoutFault),
     /// The RMSE where no press calibrated has an interval wider than the pressed area.
     #[error(
         "the RMSE where no press calibrated, {}, is unknown: its interval is wider than the pressed area ({extent_mm:.0} mm); rays that \
