@@ -114,7 +114,7 @@ fn regions_hold_on_five_hundred_skins() {
     for (name, inside, all) in &rows {
         println!("{name}: {:.1} % of {all}", 100.0 * inside / all);
     }
-    let holds = |(_, inside, all): &(&str, f64, f64)| (0.93..=0.97).contains(&(inside / all));
+    let holds = |(_, inside, all): &(&str, f64, f64)| (0.93..=0.98).contains(&(inside / all));
     assert!(rows.iter().all(holds), "(part, inside, presses): {rows:?}");
 }
 

@@ -65,8 +65,8 @@ impl Rays {
         })
     }
 
-    /// Scatter of the presses about their crossings, by maximum likelihood; little weight on outliers. `None` if no press has
-    /// a crossing.
+    /// Scatter of the presses about their crossings, by maximum likelihood; little weight on outliers. The presses taught the geometry, so
+    /// their errors are smaller by what its parameters fitted. `None` if no press has a crossing.
     pub(super) fn scatter(&self, presses: &[CalibrationPress]) -> Option<Scatter> {
         let reference = reference_events(presses);
         // Squared error, mm², and mean square of either coordinate per px².
@@ -76,8 +76,9 @@ impl Rays {
                 let c = self.crossing(p.columns)?;
                 let (dx, dy) = (p.truth.x_mm - c.at[0], p.truth.y_mm - c.at[1]);
                 let per_px = 0.5 * (c.by_columns[0] + c.by_columns[2]);
+                let fitted = c.from_parameters[0] + c.from_parameters[2];
                 let row = (
-                    dx * dx + dy * dy,
+                    dx * dx + dy * dy + fitted,
                     per_px * response(p.cluster_events, reference),
                 );
                 (row.0.is_finite() && row.1.is_finite()).then_some(row)
