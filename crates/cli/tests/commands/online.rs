@@ -156,9 +156,10 @@ fn presses_stop_at_a_depth_that_is_felt() {
     let touches = reader.touches().unwrap();
     let stopped = touches.iter().filter(|t| t.kind == TouchKind::Stopped);
     let felt_mm: Vec<f64> = stopped.map(|t| t.depth.unwrap().mm).collect();
-    assert!(felt_mm.len() >= 6, "{felt_mm:?}");
+    assert!(felt_mm.len() >= 7, "{felt_mm:?}");
+    // Later presses brake earlier, by how far the first ones went on.
     assert!(
-        felt_mm.iter().all(|mm| (0.2..0.8).contains(mm)),
+        felt_mm.iter().all(|mm| (0.0..0.8).contains(mm)) && felt_mm[6] < felt_mm[0],
         "{felt_mm:?}"
     );
     let results = skinrig(&["--json", "analyze", &session]).code(0).out;
