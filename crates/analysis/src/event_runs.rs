@@ -44,7 +44,7 @@ impl RollingRuns {
     }
 
     /// From now on selects one run in `one_in`: of those that it selected before, if `one_in` is a multiple of the number before.
-    pub const fn select_one_in(&mut self, one_in: u64) {
+    pub(crate) const fn select_one_in(&mut self, one_in: u64) {
         self.one_in = one_in;
     }
 
