@@ -166,6 +166,12 @@ async fn check_schema(conn: &mut SqliteConnection) -> Result<bool, Fault> {
     Ok(sqlx::query_scalar(sql).fetch_one(conn).await?)
 }
 
+/// Whether the run has written its header.
+pub(crate) async fn has_header(conn: &mut SqliteConnection) -> Result<bool, Fault> {
+    let sql = "SELECT EXISTS (SELECT 1 FROM session)";
+    Ok(sqlx::query_scalar(sql).fetch_one(conn).await?)
+}
+
 /// Whether no row was ever written: the file holds only the schema.
 pub(crate) async fn is_blank(conn: &mut SqliteConnection) -> Result<bool, Fault> {
     let sql =

@@ -181,8 +181,9 @@ impl SessionReader {
     }
 
     fn no_header(&self) -> RecorderError {
+        // A header that has come since was not there yet: nothing had been recorded.
         match self.query("reading its header", async |conn| {
-            open::is_blank(conn).await
+            Ok(open::is_blank(conn).await? || open::has_header(conn).await?)
         }) {
             Ok(true) => RecorderError::Empty {
                 path: self.path.clone(),
