@@ -107,6 +107,34 @@ fn regions_hold_on_eight_skins() {
     }
 }
 
+/// Each of eight places calibrates once: the geometry fits a part of how the presses scatter, and what is left of it looks small.
+#[test]
+fn regions_hold_where_few_presses_calibrate() {
+    for (bend_px, outliers) in [(5.0, 0.0), (12.0, 0.0), (5.0, 0.05), (12.0, 0.1)] {
+        let skins = (0..200).into_par_iter().map(|seed| {
+            let skin = Skin {
+                side: 4,
+                noise_px: 8.0,
+                bend_px,
+                outliers,
+                ..Skin::new(seed)
+            };
+            let choice = learn(&skin, Locator::Geometry);
+            let presses = scored(&skin, &choice).into_iter();
+            let regions = presses.filter_map(|(_, error, l)| Some(l.region?.reach(error)));
+            let reaches: Vec<f64> = regions.collect();
+            let inside = reaches.iter().filter(|reach| **reach <= 1.0).count();
+            (inside as f64, reaches.len() as f64)
+        });
+        let (inside, all) = skins.reduce(|| (0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let share = inside / all;
+        assert!(
+            (0.945..=0.99).contains(&share),
+            "bent by {bend_px} px, {outliers} far off: {share} of {all}"
+        );
+    }
+}
+
 #[test]
 #[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-analysis-tests locator -- --ignored"]
 fn regions_hold_on_five_hundred_skins() {
