@@ -125,8 +125,8 @@ fn growth(campaigns: &[Campaign]) {
             .and_then(|before| campaigns.get(before))
             .map(|before| {
                 let further = c.events as f64 - before.events as f64;
-                let power = (c.analysing.seconds / before.analysing.seconds).ln()
-                    / (c.events as f64 / before.events as f64).ln();
+                let power = libm::log(c.analysing.seconds / before.analysing.seconds)
+                    / libm::log(c.events as f64 / before.events as f64);
                 let each = 1e9 * (c.analysing.seconds - before.analysing.seconds) / further;
                 format!("  {each:.0} ns per further event, power {power:.2}")
             });

@@ -229,7 +229,7 @@ pub fn events(input: &SessionInput) -> [Vec<CdEvent>; 2] {
                     p if p < 0.25 => (PERIOD_S * random.unit(), random.idle()),
                     // The skin relaxes slowly.
                     p if p < 0.40 => {
-                        let after_s = TOUCH_S - 0.5 * random.unit().max(0.02).ln();
+                        let after_s = TOUCH_S - 0.5 * libm::log(random.unit().max(0.02));
                         (after_s, random.touched(column))
                     }
                     _ => (TOUCH_S * random.unit(), random.touched(column)),

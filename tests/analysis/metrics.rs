@@ -133,7 +133,7 @@ fn what_always_or_never_happened_has_the_exact_interval_over_locations() {
         .map(|i| row(i / 2, Some((6.0, 0.0)), Verdict::Valid))
         .collect();
     let m = measure(&rows, Exclusions::Applied);
-    let end = 0.025f64.powf(1.0 / 4.0);
+    let end = libm::pow(0.025f64, 1.0 / 4.0);
     assert!(near(m.located_rate.low, end) && m.located_rate.high == Some(1.0));
     assert!(m.within_rate.low == Some(0.0) && near(m.within_rate.high, 1.0 - end));
     // A mean of 0 is not a share.
@@ -187,7 +187,7 @@ proptest! {
         let verdicts = [Verdict::Valid, Verdict::Excluded, Verdict::Invalid, Verdict::Missed];
         let rows: Vec<PressResult> = presses.iter()
             .map(|(location, error, verdict, log)| {
-                let scale = 10f64.powf(*log);
+                let scale = libm::pow(10f64, *log);
                 row(*location, error.map(|(x, y)| (x * scale, y * scale)), verdicts[*verdict])
             })
             .collect();

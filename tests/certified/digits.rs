@@ -15,7 +15,7 @@ pub(crate) fn digits(found: f64, answer: &Answer) -> f64 {
     let off = (found - exact).abs();
     let error = if exact == 0.0 { off } else { off / exact.abs() };
     if error.is_finite() {
-        (-error.log10()).clamp(0.0, MOST) + 0.0
+        (-libm::log10(error)).clamp(0.0, MOST) + 0.0
     } else {
         0.0
     }
@@ -23,7 +23,7 @@ pub(crate) fn digits(found: f64, answer: &Answer) -> f64 {
 
 /// Digits that a result must have: 9 up to the condition number 1e5, one less for each further factor of ten.
 pub(crate) fn required(answer: &Answer) -> f64 {
-    (OF_A_DOUBLE - answer.condition.max(1.0).log10()).clamp(0.0, ENOUGH)
+    (OF_A_DOUBLE - libm::log10(answer.condition.max(1.0))).clamp(0.0, ENOUGH)
 }
 
 #[cfg(test)]

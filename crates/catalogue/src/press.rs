@@ -112,7 +112,7 @@ impl Press {
             Some(found) => found.map(|(kind, camera)| (Some(kind.to_owned()), camera))?,
         };
         let (truth, at) = (self.truth, self.location_outcome.at);
-        let error = |t: Point, e: Point| (e.x_mm - t.x_mm).hypot(e.y_mm - t.y_mm);
+        let error = |t: Point, e: Point| libm::hypot(e.x_mm - t.x_mm, e.y_mm - t.y_mm);
         let region = self.region.as_ref();
         Some(PressEntry {
             press: self.press,

@@ -93,7 +93,7 @@ fn errors(analysis: &Analysis) -> Result<Sample, skinrig_statistics::SampleFault
         .filter(|p| p.role == PressRole::Score && p.verdict == Verdict::Valid);
     Sample::rms(scored.filter_map(|p| {
         let (x, y) = p.error_mm()?;
-        Some((p.location.index(), x.hypot(y)))
+        Some((p.location.index(), libm::hypot(x, y)))
     }))
 }
 

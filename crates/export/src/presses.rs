@@ -146,7 +146,7 @@ fn outcome(table: &mut Columns<'_>) {
     table.real("error_y_mm", |r| Some(r.found?.error_mm()?.1));
     table.real("error_mm", |r| {
         let (x, y) = r.found?.error_mm()?;
-        Some(x.hypot(y))
+        Some(libm::hypot(x, y))
     });
     table.real("ray_sine", |r| r.found?.location_outcome.sine());
     let region = |r: &Row<'_>| r.found?.region;

@@ -25,7 +25,7 @@ pub(crate) fn is_counted(press: &PressResult) -> bool {
 pub(crate) fn error_norm_mm(press: &PressResult) -> Option<f64> {
     press
         .error_mm()
-        .map(|(x, y)| x.hypot(y))
+        .map(|(x, y)| libm::hypot(x, y))
         .filter(|e| e.is_finite())
 }
 

@@ -24,7 +24,7 @@ pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
 /// Decimals that show two digits of a standard error, 1 to 4; 3 without one.
 pub(crate) fn digits_of_error(standard_error: f64) -> usize {
     if standard_error.is_finite() && standard_error > 0.0 {
-        (1.0 - standard_error.log10().floor()).clamp(1.0, 4.0) as usize
+        (1.0 - libm::log10(standard_error).floor()).clamp(1.0, 4.0) as usize
     } else {
         3
     }
@@ -51,7 +51,7 @@ pub(crate) fn rounded_to_interval(e: &Estimate) -> (Estimate, usize) {
         _ => 0.0,
     };
     let place = if half.is_finite() && half > 0.0 {
-        10_f64.powf(half.log10().floor() - 1.0).max(FINEST)
+        libm::pow(10_f64, libm::log10(half).floor() - 1.0).max(FINEST)
     } else {
         FINEST
     };

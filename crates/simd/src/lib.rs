@@ -50,14 +50,14 @@ impl InstructionSet {
     /// All supported sets, baseline first, for tests that compare their results.
     #[must_use]
     pub fn available() -> Vec<Self> {
-        let mut sets = vec![Self::BASELINE];
+        let sets = [Self::BASELINE].into_iter();
         #[cfg(target_arch = "x86_64")]
-        {
+        let sets = {
             let level = Level::new();
-            sets.extend(level.as_sse4_2().map(|token| Self(Tier::V2(token))));
-            sets.extend(level.as_avx2().map(|token| Self(Tier::V3(token))));
-        }
-        sets
+            sets.chain(level.as_sse4_2().map(|token| Self(Tier::V2(token))))
+                .chain(level.as_avx2().map(|token| Self(Tier::V3(token))))
+        };
+        sets.collect()
     }
 
     /// Name of the level.

@@ -171,8 +171,8 @@ impl Inference {
         };
         let (value, half) = (self.value, sessions.half_width(alpha));
         (
-            value - half.hypot(value - low),
-            value + half.hypot(high - value),
+            value - libm::hypot(half, value - low),
+            value + libm::hypot(half, high - value),
         )
     }
 

@@ -57,7 +57,7 @@ impl SessionSpread {
         (a.max(b) + 1..=MAX_SESSIONS).find(|each| {
             let n = f64::from(*each);
             let own = times(2.0 * n - 2.0) * (2.0 * self.between / n).sqrt();
-            rest.hypot(own) <= distance
+            libm::hypot(rest, own) <= distance
         })
     }
 }

@@ -103,7 +103,7 @@ impl AlphaSpending {
             let error = ((last.components.between + noise / f64::from(future)) / locations).sqrt();
             let reach = |level: f64, power: f64| {
                 let t = |df: f64| student_quantile(level, df) + student_quantile(power, df);
-                (t(locations - 1.0) * error).hypot(sessions(&t))
+                libm::hypot(t(locations - 1.0) * error, sessions(&t))
             };
             apart >= reach(1.0 - 0.5 * alpha, settings.power)
                 || room >= reach(1.0 - alpha, 0.5 * (1.0 + settings.power))

@@ -160,7 +160,10 @@ fn press(
             "estimate_mm".into(),
             json!(found.estimate().map(|p| [p.x_mm, p.y_mm])),
         );
-        map.insert("error_mm".into(), json!(error.map(|(x, y)| x.hypot(y))));
+        map.insert(
+            "error_mm".into(),
+            json!(error.map(|(x, y)| libm::hypot(x, y))),
+        );
         map.insert("views".into(), views(found, geometry));
     }
     value

@@ -137,7 +137,7 @@ fn approach_points(
 /// Start of approach `n` of `of`: from a different side each time, alternately from above and from
 /// below.
 fn approach_start(target: Point3<Skin>, n: u32, of: u32) -> Point3<Skin> {
-    let (sin, cos) = (std::f64::consts::TAU * f64::from(n) / f64::from(of)).sin_cos();
+    let (sin, cos) = libm::sincos(std::f64::consts::TAU * f64::from(n) / f64::from(of));
     let up = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
     let [x, y, z] = target.to_array();
     let aside = APPROACH_MM * std::f64::consts::FRAC_1_SQRT_2;
@@ -239,7 +239,7 @@ fn measure_steps(
 
 /// Target of step `n`: alternately along +x, +y, -x and -y.
 fn step_target(centre: Point3<Skin>, distance_mm: f64, n: u32) -> Point3<Skin> {
-    let (sin, cos) = (f64::from(n) * std::f64::consts::FRAC_PI_2).sin_cos();
+    let (sin, cos) = libm::sincos(f64::from(n) * std::f64::consts::FRAC_PI_2);
     let [x, y, z] = centre.to_array();
     Point3::new(x + distance_mm * cos, y + distance_mm * sin, z)
 }

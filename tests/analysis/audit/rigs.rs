@@ -109,8 +109,8 @@ fn path(random: &mut Random, least: usize) -> Vec<Point2> {
             let angle = std::f64::consts::TAU * i as f64 / 8.0;
             let radius = if i < 8 { 22.0 } else { 11.0 };
             Point2::new(
-                c.x_mm - 6.0 + radius * angle.cos(),
-                c.y_mm + radius * angle.sin(),
+                c.x_mm - 6.0 + radius * libm::cos(angle),
+                c.y_mm + radius * libm::sin(angle),
             )
         };
         return (0..16).map(on).collect();
@@ -243,7 +243,8 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
             } else {
                 at
             };
-            let bent = wishes.bent_px * (0.09 * at.x_mm + k as f64).sin() * (0.07 * at.y_mm).cos();
+            let bent =
+                wishes.bent_px * libm::sin(0.09 * at.x_mm + k as f64) * libm::cos(0.07 * at.y_mm);
             let wave = wave(seed, k, at);
             let Some(u) = truth.cameras[k].column_of_point(at) else {
                 continue;
@@ -312,8 +313,8 @@ pub(crate) fn session(seed: u64, wishes: SessionOptions) -> Session {
 /// Height of a wave across the skin as a camera sees it, -1 to 1.
 fn wave(seed: u64, camera: usize, at: Point2) -> f64 {
     let seed = seed as f64;
-    let along_mm = at.x_mm * seed.sin() + at.y_mm * seed.cos();
-    (0.05 * along_mm + 1.7 * seed + 3.0 * camera as f64 * (3.1 * seed).sin()).sin()
+    let along_mm = at.x_mm * libm::sin(seed) + at.y_mm * libm::cos(seed);
+    libm::sin(0.05 * along_mm + 1.7 * seed + 3.0 * camera as f64 * libm::sin(3.1 * seed))
 }
 
 /// The executed press: slightly late, slightly off its location.

@@ -273,7 +273,7 @@ fn long_recording(presses: &[PressSpan], clock: &PlantedClock) -> RateHistogram 
             let level = match k {
                 0..16 => 1.0,
                 34..55 => 0.7,
-                _ => 0.3 * (-after / 0.8).exp(),
+                _ => 0.3 * libm::exp(-after / 0.8),
             };
             let t = contact + f64::from(k) * 1e4;
             (0..(strength * level) as u32).for_each(|_| h.add(t as u64));

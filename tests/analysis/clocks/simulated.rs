@@ -47,7 +47,7 @@ impl Dice {
         if mean > 30.0 {
             return (mean + mean.sqrt() * self.bell()).round().max(0.0) as u32;
         }
-        let (limit, mut product, mut n) = ((-mean).exp(), self.unit(), 0);
+        let (limit, mut product, mut n) = (libm::exp(-mean), self.unit(), 0);
         while product > limit {
             product *= self.unit();
             n += 1;
@@ -110,7 +110,7 @@ impl World {
         let bursts = plan
             .iter()
             .map(|&(at_s, is_sync)| {
-                let spread: [f64; 2] = std::array::from_fn(|_| (0.4 * dice.bell()).exp());
+                let spread: [f64; 2] = std::array::from_fn(|_| libm::exp(0.4 * dice.bell()));
                 Burst {
                     at_s: at_s + 0.004 * dice.bell(),
                     strength: if is_sync { sync } else { spread }.map(|s| height * s),
@@ -301,7 +301,7 @@ impl World {
                     let level = match i {
                         0..16 => 1.0,
                         34..55 => 0.7,
-                        _ => 0.25 * (-after_s / 0.4).exp(),
+                        _ => 0.25 * libm::exp(-after_s / 0.4),
                     };
                     add(burst.at_s + after_s, height * level);
                 }

@@ -29,10 +29,10 @@ const BIN_S: f64 = 2e-4;
 fn counts(random: &mut Random, per_s: impl Fn(usize) -> f64, bins: usize) -> Vec<u32> {
     (0..bins)
         .map(|bin| {
-            let (mut n, mut t) = (0, -(1.0 - random.unit()).ln());
+            let (mut n, mut t) = (0, -libm::log(1.0 - random.unit()));
             while t < per_s(bin) * BIN_S {
                 n += 1;
-                t -= (1.0 - random.unit()).ln();
+                t -= libm::log(1.0 - random.unit());
             }
             n
         })

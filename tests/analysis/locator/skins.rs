@@ -97,14 +97,14 @@ impl Remount {
     }
 
     pub(crate) fn forth(&self, at: Point2) -> Point2 {
-        let (sin, cos) = self.turn_deg.to_radians().sin_cos();
+        let (sin, cos) = libm::sincos(self.turn_deg.to_radians());
         let (x, y) = (at.x_mm - 10.0, at.y_mm - 2.0);
         let [dx, dy] = self.shift_mm;
         Point2::new(10.0 + dx + cos * x - sin * y, 2.0 + dy + sin * x + cos * y)
     }
 
     fn back(&self, at: Point2) -> Point2 {
-        let (sin, cos) = self.turn_deg.to_radians().sin_cos();
+        let (sin, cos) = libm::sincos(self.turn_deg.to_radians());
         let [dx, dy] = self.shift_mm;
         let (x, y) = (at.x_mm - 10.0 - dx, at.y_mm - 2.0 - dy);
         Point2::new(10.0 + cos * x + sin * y, 2.0 - sin * x + cos * y)
@@ -164,8 +164,8 @@ impl Skin {
             let part = waves[4 * camera..4 * camera + 4].iter();
             let sum: f64 = part
                 .map(|[a, k, direction, phase]| {
-                    let (sin, cos) = direction.sin_cos();
-                    a * (k * (cos * at.x_mm + sin * at.y_mm) + phase).sin()
+                    let (sin, cos) = libm::sincos(*direction);
+                    a * libm::sin(k * (cos * at.x_mm + sin * at.y_mm) + phase)
                 })
                 .sum();
             0.5 * self.bend_px * sum
@@ -185,9 +185,9 @@ impl Skin {
                 Spreads::Absent => None,
                 Spreads::Near(relative) => {
                     let width = outlier * 1500.0 / at.distance_mm(eye).max(10.0);
-                    Some([width, 0.5 * width].map(|w| w * (relative * scatter()).exp()))
+                    Some([width, 0.5 * width].map(|w| w * libm::exp(relative * scatter())))
                 }
-                Spreads::Chance => Some([30.0, 15.0].map(|w| w * (0.2 * scatter()).exp())),
+                Spreads::Chance => Some([30.0, 15.0].map(|w| w * libm::exp(0.2 * scatter()))),
             }
         };
         let step = 64.0 / f64::from(self.side - 1);
@@ -204,7 +204,7 @@ impl Skin {
                 let [Some(one), Some(two)] = columns else {
                     continue;
                 };
-                let strength = depth_mm / 2.0 * (self.weak * noise.normal()).exp();
+                let strength = depth_mm / 2.0 * libm::exp(self.weak * noise.normal());
                 let events = (100.0 * strength).round().max(1.0) as u32;
                 let spread = self.noise_px * (100.0 / f64::from(events)).sqrt();
                 let far = noise.unit() < self.outliers;
@@ -302,7 +302,9 @@ pub(crate) fn errors(skin: &Skin, choice: &LocatorChoice) -> Vec<f64> {
         .iter()
         .filter(|p| p.role == PressRole::Score)
         .count();
-    let lengths = located.iter().map(|(_, e, _)| e[0].hypot(e[1]).min(141.4));
+    let lengths = located
+        .iter()
+        .map(|(_, e, _)| libm::hypot(e[0], e[1]).min(141.4));
     lengths.chain((located.len()..all).map(|_| 141.4)).collect()
 }
 

@@ -74,7 +74,7 @@ fn moved_geometry(to: impl Fn(Point2) -> Point2) -> StereoGeometry {
 
 #[test]
 fn a_turned_skin_is_located_where_it_turned_to() {
-    let (sin, cos) = 0.7_f64.sin_cos();
+    let (sin, cos) = libm::sincos(0.7_f64);
     let turn = |p: Point2| Point2::new(cos * p.x_mm - sin * p.y_mm, sin * p.x_mm + cos * p.y_mm);
     holds(|p| moved_press(p, turn), &moved_geometry(turn), turn, 0.02);
 }

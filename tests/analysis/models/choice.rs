@@ -135,7 +135,7 @@ fn run(scene: &Scene, seed: u64) -> Run {
         sorted.sort_by(f64::total_cmp);
         sorted[sorted.len() / 2]
     };
-    let bound_mm = 5.0 / 2f64.ln().sqrt() / 2f64.sqrt()
+    let bound_mm = 5.0 / libm::log(2f64).sqrt() / 2f64.sqrt()
         * errors.iter().map(median).fold(f64::INFINITY, f64::min);
     let errors = errors.map(|e| {
         let squares: f64 = e.iter().map(|e| e.min(bound_mm).powi(2)).sum();

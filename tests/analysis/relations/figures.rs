@@ -82,8 +82,8 @@ fn without_order(path: &str, value: &Value) -> Option<Vec<(String, f64)>> {
         "presses[].region.angle_deg" => {
             let twice = 2.0 * value.as_f64()?.to_radians();
             Some(vec![
-                named("cos_twice", twice.cos()),
-                named("sin_twice", twice.sin()),
+                named("cos_twice", libm::cos(twice)),
+                named("sin_twice", libm::sin(twice)),
             ])
         }
         _ => None,
@@ -116,7 +116,7 @@ pub(crate) fn digits(a: &Figure, b: &Figure) -> f64 {
         _ if a == b => f64::INFINITY,
         (Figure::Number(a), Figure::Number(b)) => {
             let size = a.abs().max(b.abs()).max(1.0);
-            -((a - b).abs() / size).log10()
+            -libm::log10((a - b).abs() / size)
         }
         _ => f64::NEG_INFINITY,
     }

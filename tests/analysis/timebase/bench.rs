@@ -27,13 +27,13 @@ impl Random {
 
     /// Exponential, of mean 1.
     fn exponential(&mut self) -> f64 {
-        -self.between(0.0, 1.0).max(1e-9).ln()
+        -libm::log(self.between(0.0, 1.0).max(1e-9))
     }
 
     /// Standard normal (Box and Muller 1958).
     fn normal(&mut self) -> f64 {
         let radius = (2.0 * self.exponential()).sqrt();
-        radius * (std::f64::consts::TAU * self.between(0.0, 1.0)).cos()
+        radius * libm::cos(std::f64::consts::TAU * self.between(0.0, 1.0))
     }
 }
 
@@ -70,7 +70,7 @@ impl Clock {
         self.origin_us
             + host_us * (1.0 + self.drift)
             + 0.5 * self.wander * host_us * host_us
-            + self.swing.0 / self.swing.1 * (self.swing.1 * host_us).sin()
+            + self.swing.0 / self.swing.1 * libm::sin(self.swing.1 * host_us)
             + self.random_walk_at(host_us)
     }
 
@@ -317,7 +317,7 @@ pub(crate) fn run(mut r: Random, boxed: Clock, cameras: [Clock; 2], c: &Conditio
                 // The box counts the offset on its own clock.
                 let host_us = at_us + offset as f64 / (1.0 + boxed.drift);
                 let late = if c.decays {
-                    -c.jitter_us * r.between(1e-9, 1.0).ln()
+                    -c.jitter_us * libm::log(r.between(1e-9, 1.0))
                 } else {
                     r.between(0.0, c.jitter_us)
                 };

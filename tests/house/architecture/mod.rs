@@ -134,6 +134,7 @@ const HARNESSES: &[&str] = &[
     "skinrig-bench",
     "skinrig-browser",
     "skinrig-certified",
+    "skinrig-machines",
     "skinrig-fuzz",
     "skinrig-planted",
     "skinrig-wrong-inputs",

@@ -44,7 +44,7 @@ impl Sweep {
         while places.len() < self.locations {
             let place = [10.0 + 35.0 * unit(), 2.0 + 35.0 * unit()];
             spacing *= 0.999;
-            let apart = |p: &[f64; 2]| (p[0] - place[0]).hypot(p[1] - place[1]) > spacing;
+            let apart = |p: &[f64; 2]| libm::hypot(p[0] - place[0], p[1] - place[1]) > spacing;
             if places.iter().all(apart) {
                 places.push(place);
             }

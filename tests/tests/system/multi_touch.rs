@@ -99,7 +99,7 @@ impl Bench {
             };
             let [least, most] = ONSETS_MS;
             let after_ms = if k < self.pairs {
-                least * (most / least).powf(unit())
+                least * libm::pow(most / least, unit())
             } else {
                 0.0
             };
@@ -110,7 +110,7 @@ impl Bench {
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 /// Height of the tip at `t` s.

@@ -220,7 +220,7 @@ fn figures(scene: &Scene) -> Vec<Figure> {
         published::RMSE_MM,
         0.1,
     );
-    rmse.within[1] = 1.1 * f64::hypot(published::RMSE_X_MM, published::RMSE_Y_MM);
+    rmse.within[1] = 1.1 * libm::hypot(published::RMSE_X_MM, published::RMSE_Y_MM);
     vec![
         figure(
             "data rate of presses, B/s",

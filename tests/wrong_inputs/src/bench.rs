@@ -271,8 +271,8 @@ impl Bench {
                 .filter(|(from, _)| camera == 1 && pressed.contact_s >= *from)
                 .map_or(0.0, |(_, px)| px);
             // Errors of a skin are correlated between neighbouring locations, with a small random part.
-            let bias = 5.0 * (pressed.at.x_mm / 11.0 + 2.0 * camera as f64).sin()
-                + 4.0 * (pressed.at.y_mm / 9.0).sin();
+            let bias = 5.0 * libm::sin(pressed.at.x_mm / 11.0 + 2.0 * camera as f64)
+                + 4.0 * libm::sin(pressed.at.y_mm / 9.0);
             let centre = u + bias + nudge + 3.0 * random.normal();
             for n in 0..120 {
                 let on = n % 3 != 0;

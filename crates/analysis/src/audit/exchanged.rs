@@ -40,7 +40,7 @@ pub(crate) fn exchanged_rows(
                 .filter(|i| rows.is_elsewhere(*i, read[*i]))
                 .collect();
             // One of the rows that are off.
-            let cost = (off.len() as f64).ln();
+            let cost = libm::log(off.len() as f64);
             let gains = elsewhere
                 .iter()
                 .map(|i| rows.loss(*i, *i) - rows.loss(*i, read[*i]) - cost);

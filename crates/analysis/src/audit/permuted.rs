@@ -55,7 +55,7 @@ pub(crate) fn permuted_rows(
     let cameras = as_is.fits.iter().zip(fits);
     let narrower = cameras.filter_map(|(before, after)| {
         let (before, after) = (before.as_ref()?, after?);
-        Some((before.spread_deg / after.spread_deg).ln())
+        Some(libm::log(before.spread_deg / after.spread_deg))
     });
     // Of both cameras.
     let per_row: f64 = narrower.sum();
@@ -83,7 +83,7 @@ pub(crate) fn permuted_rows(
 fn move_cost(i: usize, j: usize) -> f64 {
     match i.abs_diff(j) {
         0 => 0.0,
-        rows => MOVED + ((1 + 2 * rows) as f64).ln(),
+        rows => MOVED + libm::log((1 + 2 * rows) as f64),
     }
 }
 

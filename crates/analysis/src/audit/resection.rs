@@ -60,7 +60,7 @@ pub(crate) fn resect(
         let residuals = residuals(&moved(drawn, &off), pairs);
         let spread = spread_deg(&residuals)?;
         let prior: f64 = (0..PARAMETERS).map(|k| (off[k] / PRIOR[k]).powi(2)).sum();
-        let cost = independent * spread.ln() + 0.5 * prior;
+        let cost = independent * libm::log(spread) + 0.5 * prior;
         if best.is_none_or(|(least, ..)| cost < least) {
             best = Some((cost, off, spread));
         }

@@ -203,7 +203,7 @@ mod tests {
                 repetition: 0,
                 columns: [320.0; 2],
                 spreads: [None; 2],
-                truth: Point2::new(30.0 * angle.cos(), 30.0 * angle.sin()),
+                truth: Point2::new(30.0 * libm::cos(angle), 30.0 * libm::sin(angle)),
                 cluster_events: *events,
             }
         });

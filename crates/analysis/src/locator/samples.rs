@@ -106,7 +106,7 @@ pub(super) fn planted(n: u32) -> Vec<Sample> {
         Sample {
             location: i,
             at,
-            residual: (0.08 * at[0]).sin() + 0.3 * scatter + if i == 7 { 9.0 } else { 0.0 },
+            residual: libm::sin(0.08 * at[0]) + 0.3 * scatter + if i == 7 { 9.0 } else { 0.0 },
             response: 0.5 * (1.0 + f64::from(i % 3)),
             count: 1.0,
         }

@@ -89,8 +89,9 @@ use crate::rule::Rule;
 /// Version of this layout and of the algorithms behind it; part of every result. Results of another version are not read,
 /// except their summary. Version 29: positions in another scale are also found about their middle, and unused settings are named. Version 30:
 /// so are lists of presses in any other order. Version 31: touches felt while recording have depths. Version 32: parts of the picture without
-/// events are named. Version 33: so are cameras that change, and faults of the readout; slow tips and bent skins are no faults.
-pub const ANALYSIS_VERSION: u32 = 33;
+/// events are named. Version 33: so are cameras that change, and faults of the readout; slow tips and bent skins are no faults. Version 34: results are
+/// the same on every processor.
+pub const ANALYSIS_VERSION: u32 = 34;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -195,7 +195,7 @@ impl SyntheticLab {
             camera,
             estimate_x_mm: is_seen.then_some(x + 0.01 + error[0]),
             estimate_y_mm: is_seen.then_some(y + error[1]),
-            error_mm: is_seen.then(|| error[0].hypot(error[1])),
+            error_mm: is_seen.then(|| libm::hypot(error[0], error[1])),
             region_major_mm: is_seen.then_some(3.0),
             region_minor_mm: is_seen.then_some(2.0),
             region_angle_deg: is_seen.then_some(-45.0),

@@ -216,7 +216,7 @@ fn at(
         };
         let error = [truth.x_mm - location.at[0], truth.y_mm - location.at[1]];
         after.push((sighting.host_us - sighting.onset_us) as f64 * 1e-3);
-        errors.push(error[0].hypot(error[1]));
+        errors.push(libm::hypot(error[0], error[1]));
         if let Some(region) = sighting.position.region {
             sizes.push(region.semi_axes_mm[0]);
             inside += usize::from(region.reach(error) <= 1.0);

@@ -202,7 +202,7 @@ fn the_presses_are_those_of_the_results(ask: &dyn Fn(&[&str]) -> Vec<Value>, poi
                 let of = |at: &Value, axis: &str| at[axis].as_f64().unwrap();
                 let off =
                     |axis| of(&press["location_outcome"]["at"], axis) - of(&press["truth"], axis);
-                errors.push(off("x_mm").hypot(off("y_mm")));
+                errors.push(libm::hypot(off("x_mm"), off("y_mm")));
             }
         }
     }

@@ -105,7 +105,7 @@ fn presses(session: &Path, analysis: &Analysis) -> Truth {
         let error = found.error_mm();
         put("error_x_mm", json!(error.map(|e| e.0)));
         put("error_y_mm", json!(error.map(|e| e.1)));
-        put("error_mm", json!(error.map(|(x, y)| x.hypot(y))));
+        put("error_mm", json!(error.map(|(x, y)| libm::hypot(x, y))));
         let outcome = serde_json::to_value(found.location_outcome).unwrap();
         put("ray_sine", outcome["sine"].clone());
         let region = found.region;

@@ -120,10 +120,10 @@ fn error_budget(of: &SkinPresses, locations: &[usize]) -> ErrorBudget {
         robot,
         scatter,
         bias,
-        per_event: per_event.ln(),
-        width2: width2.ln(),
-        excess: (cluster / (width2 * per_event)).ln(),
-        idle: mean(&|o| o.idle_per_s).max(1.0).ln(),
+        per_event: libm::log(per_event),
+        width2: libm::log(width2),
+        excess: libm::log(cluster / (width2 * per_event)),
+        idle: libm::log(mean(&|o| o.idle_per_s).max(1.0)),
     }
 }
 
@@ -171,11 +171,11 @@ fn split_change(pair: &[ErrorBudget; 2]) -> [f64; FACTORS.len()] {
         logs.excess_by_noise,
         logs.width,
     ];
-    let over = (b.scatter / a.scatter).ln() - direct.iter().sum::<f64>();
+    let over = libm::log(b.scatter / a.scatter) - direct.iter().sum::<f64>();
     let more = attribute(over, &reach, 1.0);
     let of_scatter = parts(a.scatter, b.scatter, [0, 1, 2].map(|i| direct[i] + more[i]));
     let bias = [a, b].map(|t| t.bias.max(MIN_BIAS * (t.scatter + t.bias)));
-    let log = (bias[1] / bias[0]).ln();
+    let log = libm::log(bias[1] / bias[0]);
     let of_bias = attribute(log, &reach, 2.0).map(|part| {
         let share = if log.abs() > 1e-9 { part / log } else { 0.0 };
         share * (b.bias - a.bias)
@@ -251,7 +251,7 @@ fn attribute(log: f64, reach: &[f64; 3], times: f64) -> [f64; 3] {
 
 /// (a - b) / ln(a / b); `a` when both are equal.
 fn logarithmic_mean(a: f64, b: f64) -> f64 {
-    let ratio = (b / a).ln();
+    let ratio = libm::log(b / a);
     if ratio.abs() < 1e-9 {
         a
     } else {

@@ -70,9 +70,7 @@ fn brighten(of: &mut Subject, times: f64) {
 fn move_camera(pair: &mut [Subject; 2], errors: f64) {
     let [a, b] = pair;
     let [a, b] = [a, b].map(|s| s.sessions[0].analysis.calibration.as_mut().unwrap());
-    let both = a.standard_errors[0]
-        .unwrap()
-        .hypot(b.standard_errors[0].unwrap());
+    let both = libm::hypot(a.standard_errors[0].unwrap(), b.standard_errors[0].unwrap());
     b.values[0] = a.values[0] + errors * both;
 }
 

@@ -75,7 +75,7 @@ fn the_values_of_a_skin_are_those_of_its_presses() {
         let share = mean(
             errors
                 .iter()
-                .map(|e| f64::from(u8::from(e.0.hypot(e.1) <= WITHIN_MM))),
+                .map(|e| f64::from(u8::from(libm::hypot(e.0, e.1) <= WITHIN_MM))),
         );
         for (metric, expected) in [
             (Metric::Rmse, rmse),
@@ -163,7 +163,7 @@ fn the_map_has_the_error_of_each_location() {
                     p.planned.x_mm - location.at.x_mm,
                     p.planned.y_mm - location.at.y_mm,
                 );
-                d.0.hypot(d.1) < 0.05
+                libm::hypot(d.0, d.1) < 0.05
             };
             let presses: Vec<_> = scored(subject).filter(at_location).collect();
             assert_eq!(presses.len(), 2, "{location:?}");

@@ -174,7 +174,7 @@ impl RobotModel {
         if self.now - t > 100 * MS {
             self.escape(format!("a motion led by a pose of {t} ns"));
         }
-        let sideways = (target[0] - at[0]).hypot(target[1] - at[1]);
+        let sideways = libm::hypot(target[0] - at[0], target[1] - at[1]);
         let low = target[2].min(at[2]) < LIMITS.clearance_mm - tolerance - near;
         if sideways > tolerance + near && low {
             self.escape(format!("{sideways} mm sideways, low, to {target:?}"));

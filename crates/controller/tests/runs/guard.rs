@@ -46,7 +46,7 @@ fn guarded() -> (Shared, GuardedIndenter<'static>) {
 
 /// Whether the surroundings allow a motion, checked independently by points on its path.
 fn allows(from: [f64; 3], to: [f64; 3]) -> bool {
-    let sideways = (from[0] - to[0]).hypot(from[1] - to[1]);
+    let sideways = libm::hypot(from[0] - to[0], from[1] - to[1]);
     if sideways <= 0.05 && to[2] - from[2] >= sideways {
         return true;
     }
@@ -56,7 +56,7 @@ fn allows(from: [f64; 3], to: [f64; 3]) -> bool {
     let free = (0..=4000).all(|i| {
         let s = f64::from(i) / 4000.0;
         let at = |k: usize| from[k] + s * (to[k] - from[k]);
-        (at(0) - 30.0).hypot(at(1)) > 4.95
+        libm::hypot(at(0) - 30.0, at(1)) > 4.95
     });
     free || from[2].min(to[2]) >= 10.95
 }
@@ -114,9 +114,9 @@ proptest! {
                     let fresh = last.is_some_and(|p| now - p.t.0 <= 100 * MS);
                     let sideways = last.is_none_or(|p| {
                         let [a, b, c] = p.measured.to_array();
-                        let aside = (x - a).hypot(y - b);
+                        let aside = libm::hypot(x - a, y - b);
                         let steep = aside <= 0.05 && z - c >= aside;
-                        let off = foot.map_or(0.0, |[u, v]| (x - u).hypot(y - v));
+                        let off = foot.map_or(0.0, |[u, v]| libm::hypot(x - u, y - v));
                         (aside > 0.05 || (!steep && off > 0.05)) && z.min(c) < 4.95
                     });
                     let allowed = [x, y, z, speed].iter().all(|v| v.is_finite())

@@ -41,7 +41,7 @@ fn a_braked_arm_in_contact_rises_before_anything_else() {
             assert!(at_edge || w.violations.is_empty(), "{case}");
             let (first, ..) = w.commands[0];
             assert_eq!(first[2], LIMITS.clearance_mm, "straight up: {case}");
-            let aside = (first[0] - start[0]).hypot(first[1] - start[1]);
+            let aside = libm::hypot(first[0] - start[0], first[1] - start[1]);
             assert!(aside <= LIMITS.position_tolerance_mm, "{case}");
         }
     }

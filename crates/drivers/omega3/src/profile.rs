@@ -207,7 +207,7 @@ mod tests {
                 (length - ramp) / speed + 2.0 * ramp / speed
             } else {
                 // Too short for full speed: at most twice the time of a bang-bang jerk profile without acceleration limit.
-                4.0 * (length / (2.0 * jerk)).cbrt() + 2.0 * (length / acceleration).sqrt()
+                4.0 * libm::cbrt(length / (2.0 * jerk)) + 2.0 * (length / acceleration).sqrt()
             };
             prop_assert!(t <= 1.1 * ideal + 0.1, "{t} s for {ideal} s");
         }

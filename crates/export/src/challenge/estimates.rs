@@ -240,7 +240,7 @@ impl Estimates {
             let Some(Position { at: [x, y], .. }) = position else {
                 continue;
             };
-            let away_mm = (x - centre.x_mm).hypot(y - centre.y_mm);
+            let away_mm = libm::hypot(x - centre.x_mm, y - centre.y_mm);
             if away_mm > most_mm {
                 return Some(Implausible::FarAway {
                     press: *press,
@@ -249,7 +249,7 @@ impl Estimates {
                     most_mm,
                 });
             }
-            extent_mm = Some(extent_mm.unwrap_or(0.0).max(x.hypot(*y)));
+            extent_mm = Some(extent_mm.unwrap_or(0.0).max(libm::hypot(*x, *y)));
         }
         let extent_mm = extent_mm.filter(|extent| *extent < TINY * most_mm)?;
         Some(Implausible::Tiny { extent_mm })

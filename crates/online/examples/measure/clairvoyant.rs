@@ -109,7 +109,7 @@ impl Template {
             }
         }
         let smooth = |tau: usize| {
-            let weight = |o: usize| (-0.5 * ((o as f64 - tau as f64) / SIGMA).powi(2)).exp();
+            let weight = |o: usize| libm::exp(-0.5 * ((o as f64 - tau as f64) / SIGMA).powi(2));
             let sums = (0..WINDOW).fold((0.0, 0.0), |(v, w), o| {
                 (v + weight(o) * course[o], w + weight(o))
             });
@@ -145,7 +145,7 @@ impl Template {
                 let rate = self.course[tau];
                 *sum -= rate;
                 for over in &seen {
-                    *sum += (rate * over).ln_1p();
+                    *sum += libm::log1p(rate * over);
                 }
                 if (slot - from) as usize >= tau {
                     best = best.max(*sum);
@@ -180,5 +180,5 @@ pub(crate) fn threshold(maxima: &[f64], per_s: f64) -> f64 {
     let base = maxima[count];
     let scale = maxima[..count].iter().map(|m| m - base).sum::<f64>() / count as f64;
     let seconds = maxima.len() as f64 * BLOCK as f64 * SLOT_US as f64 * 1e-6;
-    base + scale * (count as f64 / (seconds * per_s)).ln()
+    base + scale * libm::log(count as f64 / (seconds * per_s))
 }

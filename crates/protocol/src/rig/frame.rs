@@ -130,7 +130,7 @@ impl FrameKeys {
             (None, None) | (Some(_), Some(_)) => return None, // reported by `exactly_one`
         };
         let up = frame.robot_from_skin.rotation[2][2].clamp(-1.0, 1.0);
-        let tilt = up.acos().to_degrees();
+        let tilt = libm::acos(up).to_degrees();
         if tilt > MOST_TILT_DEG {
             let help = if tilt > 135.0 {
                 "the skin would face down: check whether the points are mirrored or x and y are swapped"
@@ -245,7 +245,7 @@ pub(super) fn rotated(
     roll: f64,
     shift_mm: [f64; 3],
 ) -> RigidTransform<Robot, Skin> {
-    let of = |degrees: f64| degrees.to_radians().sin_cos();
+    let of = |degrees: f64| libm::sincos(degrees.to_radians());
     let ((sa, ca), (sb, cb), (sc, cc)) = (of(yaw), of(pitch), of(roll));
     RigidTransform::new(
         [

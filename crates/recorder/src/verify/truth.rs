@@ -139,7 +139,7 @@ impl Path {
         }
         let [x_mm, y_mm, z_mm] = sum.map(|sum| sum / n);
         if let Some(found) = outcome.measured_at {
-            let off_mm = f64::hypot(found.x_mm - x_mm, found.y_mm - y_mm);
+            let off_mm = libm::hypot(found.x_mm - x_mm, found.y_mm - y_mm);
             if off_mm > SETTLING_MM || off_mm.is_nan() {
                 report.mismatch(
                     attempt.id,

@@ -83,7 +83,7 @@ fn level(count: u64, most: u64) -> u8 {
     if count == 0 {
         return 0;
     }
-    let share = (count as f64).ln() / (most.max(2) as f64).ln();
+    let share = libm::log(count as f64) / libm::log(most.max(2) as f64);
     1 + (share * f64::from(LEVELS - 2)).round() as u8
 }
 
@@ -101,7 +101,7 @@ fn png(picture: &Activity, most: u64) -> Option<Vec<u8>> {
 
 /// Colour scale with decades.
 fn scale(svg: &mut Markup, most: u64, (x, top, height): (f64, f64, f64)) {
-    let end = (most.max(2) as f64).log10();
+    let end = libm::log10(most.max(2) as f64);
     let scale = Scale::new((0.0, end), (top + height, top));
     let marks = (0..=end.floor() as i32).map(|p| (f64::from(p), power_of_ten(p)));
     let colour = |share| hex(viridis_rgb(share));

@@ -47,8 +47,8 @@ pub(crate) fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
     let published = published::FALSE_ALARMS_PER_S.0;
     let rates = rows.iter().map(|r| r.false_alarms_per_s).chain([published]);
     let (low, high) = extent(rates.filter(|f| *f > 0.0)).unwrap_or((1.0, 1.0));
-    let first = low.log10().floor() as i32 - 1;
-    let end = (high.log10().ceil() as i32).max(first + 2);
+    let first = libm::log10(low).floor() as i32 - 1;
+    let end = (libm::log10(high).ceil() as i32).max(first + 2);
     let power = |p: i32| 10f64.powi(p);
     let decade = |p: i32| (power(p), number(Some(power(p)), (-p).max(0) as usize));
     let mut decades: Vec<_> = (first + 1..=end).map(decade).collect();

@@ -273,7 +273,7 @@ fn ellipse(layout: &Layout, place: &Place, at: Point2, region: &Region) -> Strin
     let [major, minor] = region.semi_axes_mm.map(|a| a * scale);
     // The figure's y axis runs down.
     let turn = -region.angle_deg;
-    let (sin, cos) = turn.to_radians().sin_cos();
+    let (sin, cos) = libm::sincos(turn.to_radians());
     let (x, y) = layout.px(place, at);
     let (dx, dy) = (2.0 * major * cos, 2.0 * major * sin);
     let (major, minor, turn) = (Px(major), Px(minor), Px(turn));

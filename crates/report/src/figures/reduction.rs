@@ -126,7 +126,7 @@ fn better_with_less(study: &Reduction) -> Option<(&ReductionRow, &ReductionRow)>
 
 /// Logarithm of the factor, base 2.
 fn power(row: &ReductionRow) -> f64 {
-    f64::from(row.factor.max(1)).log2()
+    libm::log2(f64::from(row.factor.max(1)))
 }
 
 fn axes(study: &Reduction, panel: &Panel) -> (Axis, Axis) {

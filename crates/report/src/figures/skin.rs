@@ -126,7 +126,7 @@ impl Layout {
         for (i, camera) in input.analysis.geometry.cameras.iter().enumerate() {
             let (x, y) = self.px(place, camera.position);
             let [dx, dy] = camera.direction(camera.skew_deg);
-            let angle = (-dy).atan2(dx).to_degrees();
+            let angle = libm::atan2(-dy, dx).to_degrees();
             svg.leaf(
                 "path",
                 &[

@@ -44,7 +44,7 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
         let p = number(Some(p), 3);
         caption += &format!(" A gain this large by chance has p = {p} (permutation test).");
     }
-    let margin = (high / low).powf(0.04).max(1.05);
+    let margin = libm::pow(high / low, 0.04).max(1.05);
     let x = Axis::log(
         (low / margin, high * margin),
         "minimum number of cluster events",
@@ -52,7 +52,7 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
     let costs = rows.iter().map(|r| r.1 * 1.05);
     let y = Axis::from_zero(costs, "cost on calibration presses (mm)").ticks(6);
     let chosen = f64::from(choice.events.max(1));
-    let away = |row: &(f64, f64)| (row.0 / chosen).ln().abs();
+    let away = |row: &(f64, f64)| libm::log(row.0 / chosen).abs();
     let nearest = rows.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
     let at = (chosen, nearest.1);
     let least = if floor { ", smallest candidate" } else { "" };

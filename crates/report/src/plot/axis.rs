@@ -143,8 +143,8 @@ impl Axis {
 
 /// Ticks of a logarithmic axis: 1, 2 and 5 of each power of ten, or only the powers.
 fn decades(low: f64, high: f64) -> Vec<(f64, String)> {
-    let wide = (high / low).log10() > MAX_DENSE_DECADES;
-    let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
+    let wide = libm::log10(high / low) > MAX_DENSE_DECADES;
+    let powers = libm::log10(low).floor() as i32..=libm::log10(high).ceil() as i32;
     let factors: &[f64] = if wide { &[1.0] } else { &[1.0, 2.0, 5.0] };
     let all = powers.flat_map(|p| factors.iter().map(move |f| f * 10f64.powi(p)));
     all.filter(|t| (low * (1.0 - 1e-9)..=high * (1.0 + 1e-9)).contains(t))

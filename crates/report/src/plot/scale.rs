@@ -8,7 +8,7 @@ pub(crate) fn ticks(low: f64, high: f64, requested: u32) -> Vec<f64> {
         return vec![];
     }
     let raw = span / f64::from(requested);
-    let power = 10f64.powf(raw.log10().floor());
+    let power = libm::pow(10f64, libm::log10(raw).floor());
     let steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter();
     let step = steps.clone().find(|s| *s >= raw * 0.999);
     let step = step.unwrap_or(10.0 * power);
@@ -21,7 +21,7 @@ pub(crate) fn ticks(low: f64, high: f64, requested: u32) -> Vec<f64> {
 #[must_use]
 pub(crate) fn tick_label(value: f64, step: f64) -> String {
     let digits = if step > 0.0 {
-        (-step.log10().floor()).max(0.0) as usize
+        (-libm::log10(step).floor()).max(0.0) as usize
     } else {
         0
     };
@@ -33,7 +33,7 @@ pub(crate) fn nice_above(value: f64) -> f64 {
     if !(value.is_finite() && value > 0.0) {
         return 1.0;
     }
-    let power = 10f64.powf(value.log10().floor());
+    let power = libm::pow(10f64, libm::log10(value).floor());
     [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
         .into_iter()
         .map(|m| m * power)
@@ -103,7 +103,7 @@ impl Scale {
     pub(crate) fn at(&self, value: f64) -> f64 {
         let (low, high) = self.data;
         let share = if self.is_log {
-            (if value > 0.0 { value } else { low } / low).ln() / (high / low).ln()
+            libm::log(if value > 0.0 { value } else { low } / low) / libm::log(high / low)
         } else {
             (value - low) / (high - low)
         };

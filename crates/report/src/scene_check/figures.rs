@@ -53,8 +53,8 @@ fn sheet<'a>(
 fn decades(bins: impl Iterator<Item = Bin>) -> Option<(f64, f64)> {
     let (low, high) = extent(bins.filter(|b| b.n > 0).flat_map(|b| [b.from, b.to]))?;
     Some((
-        power_of_ten(low.log10().floor()),
-        power_of_ten(high.log10().ceil()),
+        power_of_ten(libm::log10(low).floor()),
+        power_of_ten(libm::log10(high).ceil()),
     ))
 }
 
@@ -64,7 +64,7 @@ fn power_of_ten(exponent: f64) -> f64 {
 
 /// Every second power of ten in a range, with its text.
 fn powers(range: (f64, f64), text: fn(i32) -> String) -> Vec<(f64, String)> {
-    let [first, last] = [range.0, range.1].map(|end| end.log10().round() as i32);
+    let [first, last] = [range.0, range.1].map(|end| libm::log10(end).round() as i32);
     (first..=last)
         .filter(|exponent| exponent % 2 == 0)
         .map(|exponent| (power_of_ten(f64::from(exponent)), text(exponent)))
@@ -152,7 +152,7 @@ fn intervals(recordings: &[Recording]) -> Option<Figure> {
 
 /// Density at `us`, per µs.
 fn exponential(law: &IntervalLaw, us: f64) -> f64 {
-    (-us / law.mean_us).exp() / law.mean_us
+    libm::exp(-us / law.mean_us) / law.mean_us
 }
 
 /// Density at `us`, per µs: Tweedie (1957).
@@ -160,7 +160,7 @@ fn inverse_gaussian(law: &IntervalLaw, us: f64) -> f64 {
     let (mean, shape) = (law.mean_us, law.shape_us);
     let off = (us - mean) / mean;
     let scale = (shape / (core::f64::consts::TAU * us.powi(3))).sqrt();
-    scale * (-shape * off * off / (2.0 * us)).exp()
+    scale * libm::exp(-shape * off * off / (2.0 * us))
 }
 
 /// How often an event has one around it, by distance.
@@ -176,8 +176,8 @@ fn distances(recordings: &[Recording]) -> Option<Figure> {
     let (low, high) = extent(all.chain([1.0]))?;
     each(recordings).flat_map(line).next()?;
     let range = (
-        power_of_ten(low.log10().floor()),
-        power_of_ten(high.log10().ceil().max(1.0)),
+        power_of_ten(libm::log10(low).floor()),
+        power_of_ten(libm::log10(high).ceil().max(1.0)),
     );
     let plots = recordings.iter().enumerate().map(|(k, recording)| {
         let x = Axis::linear((0.0, 28.0), "distance (px)");
@@ -210,7 +210,10 @@ fn pixels(recordings: &[Recording]) -> Option<Figure> {
     let most = most.fold(10.0, f64::max);
     let plots = recordings.iter().enumerate().map(|(k, recording)| {
         let x = Axis::log(range, "events of a pixel").marked(powers(range, count));
-        let y = Axis::log((0.8, power_of_ten(most.log10().ceil())), "pixels per bin");
+        let y = Axis::log(
+            (0.8, power_of_ten(libm::log10(most).ceil())),
+            "pixels per bin",
+        );
         let mut plot = Plot::new(x, y).title(letter(k).to_string());
         for camera in &recording.cameras {
             let bins = camera.pixels.iter().filter(|b| b.n > 0);

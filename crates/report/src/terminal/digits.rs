@@ -63,12 +63,12 @@ pub(crate) fn text(digits: &Digits) -> String {
 
 /// Significant digits of a value with [`PRINTED`] decimals.
 fn printed_digits(value: f64) -> f64 {
-    f64::from(PRINTED) + value.abs().max(1e-2).log10().floor() + 1.0
+    f64::from(PRINTED) + libm::log10(value.abs().max(1e-2)).floor() + 1.0
 }
 
 /// The value with the digits that it has.
 fn exact(figure: &FigureDigits) -> String {
-    let before = figure.value.abs().max(1e-300).log10().floor() as i32 + 1;
+    let before = libm::log10(figure.value.abs().max(1e-300)).floor() as i32 + 1;
     let decimals = (figure.digits.floor() as i32 - before).clamp(0, 15);
     format!("{:.*}", decimals as usize, figure.value)
 }

@@ -24,7 +24,7 @@ impl Splitmix {
     pub(crate) fn exponential(&mut self) -> f64 {
         // In (0, 1], so that the logarithm is finite.
         let unit = ((self.next() >> 11) + 1) as f64 / (1u64 << 53) as f64;
-        -unit.ln()
+        -libm::log(unit)
     }
 
     pub(crate) fn event(&mut self, t_ns: i64) -> PixelEvent {

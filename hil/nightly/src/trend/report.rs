@@ -213,7 +213,7 @@ pub fn format_number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
-    let places = 3 - value.abs().log10().floor() as i32;
+    let places = 3 - libm::log10(value.abs()).floor() as i32;
     if !(0..=6).contains(&places) {
         return format!("{value:.3e}").replace(".000e", "e");
     }

@@ -43,7 +43,7 @@ impl Rule {
     #[must_use]
     pub fn mean_run_length(self, shift: f64) -> f64 {
         let exceedance = 0.5 * libm::erfc((self.limit - shift) / std::f64::consts::SQRT_2);
-        let all = exceedance.powf(self.nights as f64);
+        let all = libm::pow(exceedance, self.nights as f64);
         if exceedance >= 1.0 {
             return self.nights as f64;
         }

@@ -34,7 +34,7 @@ pub(crate) fn error(fast: f64, exact: &Real) -> f64 {
 /// Distance of a point from its exact position.
 pub(crate) fn distance(fast: Point2, exact: &[Real; 2]) -> f64 {
     let [x, y] = exact;
-    error(fast.x_mm, x).hypot(error(fast.y_mm, y))
+    libm::hypot(error(fast.x_mm, x), error(fast.y_mm, y))
 }
 
 fn radians(degrees: Real) -> Real {

@@ -35,7 +35,7 @@ fn heading(camera: &CameraModel) -> f64 {
         camera.aim.x_mm - camera.position.x_mm,
         camera.aim.y_mm - camera.position.y_mm,
     );
-    dy.atan2(dx).to_degrees()
+    libm::atan2(dy, dx).to_degrees()
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn a_contact_near_the_baseline_is_as_good_as_its_sine_or_parallel() {
     for g in geometries() {
         let [one, two] = g.cameras.map(|c| c.position);
         let (wx, wy) = (two.x_mm - one.x_mm, two.y_mm - one.y_mm);
-        let baseline = wx.hypot(wy);
+        let baseline = libm::hypot(wx, wy);
         for share in [0.1, 0.5, 0.83] {
             for height in [30.0, 1.0, 1e-3, 1e-6, 3e-8, 1e-10, 0.0] {
                 // To the left of the skin, where the presses are.

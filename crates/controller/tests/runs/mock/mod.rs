@@ -232,7 +232,7 @@ impl World {
             if self.faults.stuck_sideways_ms.is_some_and(|from| ms >= from) {
                 (tip[0], tip[1]) = (self.tip[0], self.tip[1]);
             }
-            let lateral = (tip[0] - self.tip[0]).hypot(tip[1] - self.tip[1]);
+            let lateral = libm::hypot(tip[0] - self.tip[0], tip[1] - self.tip[1]);
             if lateral > 1e-6 && tip[2].min(self.tip[2]) < self.clearance_mm - 0.051 {
                 self.violations
                     .push(format!("sideways at {:?} at {ms} ms", self.tip));

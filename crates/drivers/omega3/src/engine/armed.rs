@@ -45,7 +45,7 @@ const MAX_SIDEWAYS_MM: f64 = 0.05;
 /// tip: a loaded tip lags behind, so that a level path would appear to rise or fall.
 pub(super) fn rises(set_point: Point3<Robot>, target: Point3<Robot>) -> bool {
     let [dx, dy, up] = std::array::from_fn(|i| target.to_array()[i] - set_point.to_array()[i]);
-    let aside = f64::hypot(dx, dy);
+    let aside = libm::hypot(dx, dy);
     up > 0.0 && (up >= aside || aside <= MAX_SIDEWAYS_MM)
 }
 

@@ -308,7 +308,7 @@ fn difference(answers: &Answers, guest: &Estimates, own: &Estimates) -> Estimate
             let error = |of: &Estimates| {
                 let position = of.presses.get(&answer.press).copied().flatten()?;
                 let [x, y] = position.at;
-                Some((x - answer.x_mm).hypot(y - answer.y_mm))
+                Some(libm::hypot(x - answer.x_mm, y - answer.y_mm))
             };
             Some((answer.location, error(guest)? - error(own)?))
         })

@@ -231,7 +231,7 @@ fn magnification(result: &Comparison, k: usize) -> f64 {
         .locations
         .iter()
         .flat_map(|l| [l.skins[0].vector_mm, l.skins[k].vector_mm]);
-    let mut lengths: Vec<f64> = vectors.flatten().map(|[x, y]| x.hypot(y)).collect();
+    let mut lengths: Vec<f64> = vectors.flatten().map(|[x, y]| libm::hypot(x, y)).collect();
     lengths.sort_by(f64::total_cmp);
     let large = lengths
         .get((0.95 * lengths.len() as f64) as usize)

@@ -27,8 +27,8 @@ pub(crate) fn press(
     let far = (60.0 - at.x_mm) / 100.0;
     let sigma = 0.8 + 3.0 * far * far;
     let bias = (
-        1.6 * far * (at.y_mm / 20.0).sin(),
-        1.1 * (at.x_mm / 25.0).cos(),
+        1.6 * far * libm::sin(at.y_mm / 20.0),
+        1.1 * libm::cos(at.x_mm / 25.0),
     );
     let estimate = Point2::new(
         truth.x_mm + bias.0 + sigma * noise.normal(),
@@ -144,7 +144,7 @@ pub(crate) fn metrics(presses: &[PressResult], valid_only: bool) -> Metrics {
         high: (n > 0).then_some(v * 1.06 + 0.02),
         n,
     };
-    let mut lengths: Vec<f64> = errors.iter().map(|(x, y)| x.hypot(*y)).collect();
+    let mut lengths: Vec<f64> = errors.iter().map(|(x, y)| libm::hypot(*x, *y)).collect();
     lengths.sort_by(f64::total_cmp);
     let quantile = |q: f64| {
         lengths
@@ -220,7 +220,8 @@ pub(crate) fn picture(noise: &mut Noise, press: &PressResult, camera: CameraId) 
 }
 
 pub(crate) fn zoom(noise: &mut Noise, press: u32, camera: CameraId) -> RateZoom {
-    let bump = |i: i32, centre: f64| (-((f64::from(i) * 0.01 - 0.5 - centre) / 0.09).powi(2)).exp();
+    let bump =
+        |i: i32, centre: f64| libm::exp(-((f64::from(i) * 0.01 - 0.5 - centre) / 0.09).powi(2));
     let mut bins = |on: f64, off: f64| {
         (0..230)
             .map(|i| {

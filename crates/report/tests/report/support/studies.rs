@@ -23,7 +23,7 @@ pub(crate) fn reduction() -> Reduction {
         rows: (0..=12)
             .map(|power| {
                 let x = f64::from(power);
-                let rmse = 2.5 + 0.004 * x.powf(3.1);
+                let rmse = 2.5 + 0.004 * libm::pow(x, 3.1);
                 let share = |v: f64, spread: f64| {
                     let e = estimate(v, spread, 300);
                     Estimate {
@@ -87,7 +87,7 @@ pub(crate) fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
             ThresholdRow {
                 threshold: h,
                 onsets: 299,
-                detected_rate: 1.0 - 0.0001 * h.powf(2.2),
+                detected_rate: 1.0 - 0.0001 * libm::pow(h, 2.2),
                 median_ms: Some(12.0 + 0.4 * h),
                 width_ms: Some(26.0 + 0.25 * h),
                 false_alarms: if i < 15 { 60 - 4 * i } else { 3 },
@@ -96,7 +96,7 @@ pub(crate) fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
             }
         })
         .collect();
-    let bump = |t: f64, at: f64, width: f64| (-((t - at) / width).powi(2)).exp();
+    let bump = |t: f64, at: f64, width: f64| libm::exp(-((t - at) / width).powi(2));
     let course = |gain: f64, noise: &mut Noise| {
         (0..850)
             .map(|i| {
@@ -213,7 +213,7 @@ pub(crate) fn correlation(parameters: usize) -> Vec<Vec<Option<f64>>> {
 /// A cost that is flat, dips, and rises.
 pub(crate) fn threshold() -> ThresholdChoice {
     let cost = |events: u32| {
-        let x = f64::from(events).ln();
+        let x = libm::log(f64::from(events));
         2.9 + 0.35 * (x - 4.2).powi(2)
     };
     ThresholdChoice {
@@ -299,8 +299,9 @@ pub(crate) fn activity(noise: &mut Noise, camera: CameraId) -> Activity {
     let mut counts = vec![0; usize::from(width) * usize::from(height)];
     for (i, count) in counts.iter_mut().enumerate() {
         let (u, v) = ((i % 320) as f64, (i / 320) as f64);
-        let band = 4e4 * (-((v - 135.0) / 22.0).powi(2)).exp() * (0.4 + (u / 40.0).sin().abs());
-        let rim = (u - 160.0).hypot(1.2 * (v - 120.0));
+        let band =
+            4e4 * libm::exp(-((v - 135.0) / 22.0).powi(2)) * (0.4 + libm::sin(u / 40.0).abs());
+        let rim = libm::hypot(u - 160.0, 1.2 * (v - 120.0));
         let seen = if rim < 165.0 { band + 30.0 } else { 0.4 };
         *count = (seen * (0.5 + noise.uniform())) as u64;
         if noise.uniform() < 0.0002 {
@@ -386,7 +387,7 @@ pub(crate) fn clock_residuals() -> Vec<ClockResiduals> {
                 residual_us: if k == 77 {
                     900.0
                 } else {
-                    size_us * (f64::from(k) * 0.7).sin()
+                    size_us * libm::sin(f64::from(k) * 0.7)
                 },
                 used: k != 77,
             })

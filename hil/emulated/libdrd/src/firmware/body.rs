@@ -10,7 +10,7 @@ const END_STOP: (f64, f64) = (20_000.0, 60.0);
 
 /// Direction of gravity in the robot frame of a base tilted about the inverted y axis.
 pub fn gravity(mass_kg: f64, tilt_deg: f64) -> Vector {
-    let (sin, cos) = tilt_deg.to_radians().sin_cos();
+    let (sin, cos) = libm::sincos(tilt_deg.to_radians());
     scale([-sin, 0.0, -cos], mass_kg * GRAVITY_M_S2)
 }
 

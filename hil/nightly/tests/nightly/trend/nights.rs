@@ -365,7 +365,7 @@ impl Metric {
                 let chi: f64 = (0..3).map(|_| normal(random).powi(2)).sum();
                 mean * (1.0 + scale * self.remember(r, z / (chi / 3.0).sqrt()))
             }
-            Skewed(median, spread) => median * (spread * normal(random)).exp(),
+            Skewed(median, spread) => median * libm::exp(spread * normal(random)),
             Share(percent, of) => {
                 let hits = (0..of)
                     .filter(|_| 100.0 * uniform(random) < percent)
@@ -387,13 +387,13 @@ fn uniform(random: &mut Xoshiro256PlusPlus) -> f64 {
 }
 
 fn normal(random: &mut Xoshiro256PlusPlus) -> f64 {
-    let radius = (-2.0 * (1.0 - uniform(random)).ln()).sqrt();
-    radius * (std::f64::consts::TAU * uniform(random)).cos()
+    let radius = (-2.0 * libm::log(1.0 - uniform(random))).sqrt();
+    radius * libm::cos(std::f64::consts::TAU * uniform(random))
 }
 
 /// Draws by Knuth's product of uniform variables, which is fast enough for small means.
 fn poisson(random: &mut Xoshiro256PlusPlus, mean: f64) -> u32 {
-    let (mut product, least, mut count) = (uniform(random), (-mean).exp(), 0);
+    let (mut product, least, mut count) = (uniform(random), libm::exp(-mean), 0);
     while product > least {
         product *= uniform(random);
         count += 1;
