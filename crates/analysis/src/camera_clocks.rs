@@ -12,7 +12,8 @@ use crate::input::{EventSource, SessionInput};
 use crate::press_spans::{spans, timings};
 use crate::rates::CameraRates;
 use crate::result::{
-    Activity, AlignmentViolation, ClockFit, OffSensor, RatesDetections, RatesEvidence, WarningCause,
+    Activity, AlignmentViolation, ClockFit, OffSensor, RatesDetections, RatesEvidence,
+    ReadoutFault, WarningCause,
 };
 use crate::segment::windows;
 use crate::tie::{Tie, UntimedPress};
@@ -168,8 +169,8 @@ impl CameraClock {
         let first = pass(source, camera, Accumulator::new(camera, settings, wanted))?;
         let (repeated, events) = (first.repeated, first.off_sensor.of);
         if repeated as f64 > MOST_REPEATED * events as f64 {
-            let cause = WarningCause::EventsRepeated { repeated, events };
-            reading.warnings.push(cause);
+            let cause = ReadoutFault::EventsTwice { repeated, events };
+            reading.warnings.push(WarningCause::Readout(cause));
         }
         Ok(Self {
             rates: first.rates,

@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use skinrig_model::{Polarity, PressId, SENSOR_WIDTH};
 
+use crate::crowded::beside;
 use crate::metrics::quantile;
 use crate::result::QuietPart;
 use crate::stretch::prevailing;
@@ -138,17 +139,11 @@ pub(crate) fn empty_run(events: &[u64]) -> Option<(usize, usize)> {
             _ => {}
         }
     }
-    let beside = |(first, last): (usize, usize)| {
-        let before = &events[first.saturating_sub(LEAST_EMPTY)..first];
-        let after = &events[last + 1..events.len().min(last + 1 + LEAST_EMPTY)];
-        let mean = |n: &[u64]| n.iter().sum::<u64>() as f64 / n.len().max(1) as f64;
-        mean(before).max(mean(after))
-    };
     let wide = runs.into_iter().filter(|run| {
         let width = run.1 - run.0 + 1;
         width >= LEAST_EMPTY
             && width as f64 * mean >= LEAST_MISSING
-            && beside(*run) >= LEAST_BESIDE * mean
+            && beside(events, run.0..run.1 + 1, LEAST_EMPTY) >= LEAST_BESIDE * mean
     });
     wide.max_by_key(|run| run.1 - run.0)
 }

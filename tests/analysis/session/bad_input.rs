@@ -1,7 +1,7 @@
 //! Sessions without data, and corrupted or contradictory ones.
 
 use proptest::prelude::*;
-use skinrig_analysis::result::{LocationOutcome, Warning, WarningCause};
+use skinrig_analysis::result::{LocationOutcome, ReadoutFault, Warning, WarningCause};
 use skinrig_analysis::{
     Analysis, AnalysisError, EventSource, EventSourceError, SessionInput, analyze,
 };
@@ -11,7 +11,7 @@ use skinrig_model::{
 };
 
 use skinrig_planted::Memory;
-use skinrig_planted::grid::{camera_us, plan, session};
+use skinrig_planted::grid::{Shape, camera_us, plan, session, session_of};
 
 #[test]
 fn a_session_without_anything_is_still_an_analysis() {
@@ -118,11 +118,46 @@ fn a_million_events_on_one_pixel_are_counted() {
 }
 
 #[test]
+fn a_rate_that_stops_at_a_ceiling_is_named() {
+    let ceilings = |a: &Analysis| -> Vec<(Option<CameraId>, f64, usize)> {
+        let of = |w: &Warning| match w.cause {
+            WarningCause::Readout(ReadoutFault::Ceiling {
+                per_ms, presses, ..
+            }) => Some((w.camera, per_ms, presses)),
+            _ => None,
+        };
+        a.warnings.iter().filter_map(of).collect()
+    };
+    let strong = Shape {
+        events: 3_000,
+        ..Shape::USUAL
+    };
+    let (input, mut source) = session_of(7, &strong);
+    assert_eq!(ceilings(&analyze(&input, &source).unwrap()), []);
+    // 20 events per ms arrive while the tip moves down; the cable carries 8.
+    let (mut ms, mut carried) = (0, 0);
+    source.events[1].retain(|e| {
+        if e.t_us / 1_000 != ms {
+            (ms, carried) = (e.t_us / 1_000, 0);
+        }
+        carried += 1;
+        carried <= 8
+    });
+    let found = ceilings(&analyze(&input, &source).unwrap());
+    let [(Some(CameraId::Two), per_ms, presses)] = found[..] else {
+        panic!("{found:?}");
+    };
+    assert!((7.5..=8.5).contains(&per_ms) && presses > 40, "{found:?}");
+}
+
+#[test]
 fn a_recording_that_holds_each_event_twice_is_named() {
     let (input, mut source) = session();
     let repeated = |a: &Analysis| -> Vec<(Option<CameraId>, u64)> {
         let of = |w: &Warning| match w.cause {
-            WarningCause::EventsRepeated { repeated, .. } => Some((w.camera, repeated)),
+            WarningCause::Readout(ReadoutFault::EventsTwice { repeated, .. }) => {
+                Some((w.camera, repeated))
+            }
             _ => None,
         };
         a.warnings.iter().filter_map(of).collect()

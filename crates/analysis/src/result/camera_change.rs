@@ -52,14 +52,12 @@ impl Display for CameraChange {
             places,
         } = *self;
         match what {
-            Changed::Events => {
-                write!(f, "events of a press change from {before:.0} to {after:.0}")?
-            }
+            Changed::Events => write!(f, "a press gives {after:.0} events instead of {before:.0}")?,
             Changed::OnShare => write!(
                 f,
-                "ON events change from {:.0} to {:.0} % of all",
-                100.0 * before,
-                100.0 * after
+                "{:.0} % of the events of a press are ON instead of {:.0} %",
+                100.0 * after,
+                100.0 * before
             )?,
             Changed::DelayMs => write!(
                 f,
@@ -68,7 +66,7 @@ impl Display for CameraChange {
         }
         write!(
             f,
-            " from about {from} on, at the same {places} places: find out what changed there, such as light, lens, bias, clock or skin, and \
+            " from about {from} on (median of {places} places): find out what changed there, such as light, lens, bias, clock or skin, and \
              record these presses again"
         )
     }

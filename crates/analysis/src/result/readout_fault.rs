@@ -20,6 +20,17 @@ pub enum ReadoutFault {
         /// The first of them, s.
         from_s: f64,
     },
+    /// Events that equal the one before.
+    #[error(
+        "{repeated} of {events} events equal the one before them (pixel, time, polarity): the recording holds events twice, and event \
+         rates are too high; convert the camera's file again"
+    )]
+    EventsTwice {
+        /// Repeated events.
+        repeated: u64,
+        /// All events.
+        events: u64,
+    },
     /// Timestamps lie far apart.
     #[error(
         "timestamps come in steps of {step_ms:.0} ms, many events to each: no latency, onset or depth is known better; find out which driver \

@@ -228,7 +228,7 @@ fn clocks_and_events() -> Vec<(Value, &'static str)> {
             "camera 1: 5 events have timestamps days away from all others and are not in the event rates",
         ),
         (
-            json!({"camera": "camera1", "kind": "events_repeated", "repeated": 500, "events": 1000}),
+            json!({"camera": "camera1", "kind": "readout", "fault": "events_twice", "repeated": 500, "events": 1000}),
             "camera 1: 500 of 1000 events equal the one before them (pixel, time, polarity): the recording holds events twice, \
              and event rates are too high; convert the camera's file again",
         ),
@@ -432,18 +432,18 @@ fn of_results() -> Vec<(Value, &'static str)> {
         ),
         (
             json!({"camera": "camera1", "kind": "camera_changed", "what": "events", "from": 64, "before": 812.4, "after": 120.2, "places": 25}),
-            "camera 1: events of a press change from 812 to 120 from about press 64 on, at the same 25 places: find out what changed there, \
+            "camera 1: a press gives 120 events instead of 812 from about press 64 on (median of 25 places): find out what changed there, \
              such as light, lens, bias, clock or skin, and record these presses again",
         ),
         (
             json!({"camera": "camera1", "kind": "camera_changed", "what": "on_share", "from": 64, "before": 0.66, "after": 0.34, "places": 25}),
-            "camera 1: ON events change from 66 to 34 % of all from about press 64 on, at the same 25 places: find out what changed there, \
+            "camera 1: 34 % of the events of a press are ON instead of 66 % from about press 64 on (median of 25 places): find out what changed there, \
              such as light, lens, bias, clock or skin, and record these presses again",
         ),
         (
             json!({"camera": "camera1", "kind": "camera_changed", "what": "delay_ms", "from": 64, "before": 61.0, "after": 112.6, "places": 25}),
-            "camera 1: the middle event of a press comes 113 instead of 61 ms after the contact from about press 64 on, at the same 25 \
-             places: find out what changed there, such as light, lens, bias, clock or skin, and record these presses again",
+            "camera 1: the middle event of a press comes 113 instead of 61 ms after the contact from about press 64 on (median of 25 \
+             places): find out what changed there, such as light, lens, bias, clock or skin, and record these presses again",
         ),
         (
             json!({"camera": "camera1", "kind": "quiet_part", "columns": [320, 639], "rows": null, "polarity": null,

@@ -185,17 +185,6 @@ pub enum WarningCause {
         /// Events.
         events: u64,
     },
-    /// Events that equal the one before.
-    #[error(
-        "{repeated} of {events} events equal the one before them (pixel, time, polarity): the recording holds events twice, and event \
-         rates are too high; convert the camera's file again"
-    )]
-    EventsRepeated {
-        /// Repeated events.
-        repeated: u64,
-        /// All events.
-        events: u64,
-    },
     /// Events outside the sensor.
     #[error(
         "{events} of {of} events are outside the sensor and ignored: the recording may be damaged, or from another sensor"
