@@ -86,7 +86,8 @@ struct CameraWindow {
     background: Background,
     /// Events since the start of the window.
     events: Vec<PackedEvent>,
-    in_order: bool,
+    /// Number of the first events that are in order.
+    in_order: usize,
     complete: bool,
 }
 
@@ -103,7 +104,7 @@ impl CameraWindow {
             from_us: None,
             background: Background::default(),
             events: Vec::with_capacity(MOST),
-            in_order: true,
+            in_order: 0,
             complete: true,
         }
     }
@@ -135,16 +136,13 @@ impl CameraWindow {
             return;
         }
         match PackedEvent::pack(event, from_us) {
-            Some(packed) if self.events.len() < MOST => {
-                self.in_order &= self.events.last().is_none_or(|last| *last <= packed);
-                self.events.push(packed);
-            }
+            Some(packed) if self.events.len() < MOST => self.events.push(packed),
             _ => self.complete = false,
         }
     }
 
     fn open(&mut self, Opening { idle_us, from_us }: Opening) {
-        (self.from_us, self.in_order) = (Some(from_us), true);
+        (self.from_us, self.in_order) = (Some(from_us), 0);
         self.complete = self
             .forgotten_us
             .is_none_or(|forgotten| forgotten < idle_us.min(from_us));
@@ -172,10 +170,8 @@ impl CameraWindow {
         let Some(from_us) = self.from_us else {
             return Seen::default();
         };
-        if !self.in_order {
-            self.events.sort_unstable();
-            self.in_order = true;
-        }
+        put_in_order(&mut self.events, self.in_order);
+        self.in_order = self.events.len();
         let before = |us: u64| self.events.partition_point(|e| u64::from(e.t_us()) < us);
         let end = until_us.saturating_sub(from_us);
         let (count, earlier) = (before(end), before(end.saturating_sub(RECENT_US)));
@@ -195,6 +191,15 @@ impl CameraWindow {
             agreement: Agreement::of(&self.events[..earlier], &self.events[earlier..count]),
         }
     }
+}
+
+/// Sorts events whose first `ordered` are in order, at the cost of those that are not and of what they belong before.
+fn put_in_order(events: &mut [PackedEvent], ordered: usize) {
+    let Some(least) = events[ordered..].iter().min() else {
+        return;
+    };
+    let from = events[..ordered].partition_point(|e| e <= least);
+    events[from..].sort_unstable();
 }
 
 /// What a camera has seen of a touch.
@@ -322,6 +327,36 @@ impl PositionEstimator {
             depth: None,
             rising: self.rise.counts(),
             complete: self.cameras.iter().all(|c| c.complete),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn events_that_come_late_are_put_in_order(times in prop::collection::vec(0_u64..40, 0..60), cuts in prop::collection::vec(0_usize..60, 0..5)) {
+            let packed = |t_us: &u64| {
+                let event = CdEvent { t_us: *t_us, x: 1, y: 200, polarity: skinrig_model::Polarity::On };
+                PackedEvent::pack(&event, 0).unwrap()
+            };
+            let arrived: Vec<PackedEvent> = times.iter().map(packed).collect();
+            let (mut events, mut ordered) = (Vec::new(), 0);
+            let mut cuts: Vec<usize> = cuts.into_iter().map(|c| c.min(arrived.len())).collect();
+            cuts.extend([0, arrived.len()]);
+            cuts.sort_unstable();
+            for part in cuts.windows(2) {
+                events.extend_from_slice(&arrived[part[0]..part[1]]);
+                put_in_order(&mut events, ordered);
+                ordered = events.len();
+                let mut all = arrived[..part[1]].to_vec();
+                all.sort_unstable();
+                prop_assert_eq!(&events, &all);
+            }
         }
     }
 }
