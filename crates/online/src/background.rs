@@ -1,6 +1,6 @@
 //! The expected events of every region without a touch: the idle rate, which adapts slowly, and the fading of the last release.
 
-use crate::log_table::steps;
+use crate::log_table::{OCTAVE, whole_steps};
 use crate::model::{TAIL_BIN, TouchModel};
 use crate::regions::{REGIONS, opposite};
 use crate::slots::SlotCounts;
@@ -61,7 +61,7 @@ fn fixed(per_slot: f64) -> i64 {
 }
 
 fn steps_of(fixed: i64) -> i32 {
-    steps(fixed.max(LEAST) as f64) - steps((1u64 << BITS) as f64)
+    whole_steps(fixed.max(LEAST) as u64) - BITS as i32 * OCTAVE
 }
 
 impl CameraRates {

@@ -17,7 +17,7 @@ const MOST_RATIO: f64 = 0.97;
 /// Fading below this part of its first half is none.
 const LEAST_FADING: f64 = 0.01;
 /// Touches are looked for from a quarter of an event to 16 events per slot: 0.5 to 32 kev/s.
-const OCTAVES: (i32, i32) = (-2, 4);
+const LOWEST_OCTAVE: i32 = -2;
 
 /// Learns from the events of `source`.
 ///
@@ -38,7 +38,7 @@ pub fn learn(
         patterns: patterns(training, &cameras),
         tail: tail(training, &cameras),
         longest_press: (longest_us / SLOT_US as f64) as i64 + 1,
-        octaves: OCTAVES,
+        lowest_octave: LOWEST_OCTAVE,
     })
 }
 

@@ -13,6 +13,7 @@ mod detector;
 mod direction;
 mod envelope;
 mod felt;
+mod history;
 mod interleave;
 mod learn;
 mod learn_skin;

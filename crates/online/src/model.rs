@@ -9,6 +9,8 @@ use crate::regions::REGIONS;
 pub(crate) const TAIL_BIN: u32 = 100;
 /// Number of those bins: 3 s.
 pub(crate) const TAIL_BINS: usize = 60;
+/// Event rates at which touches are looked for, each twice the one before.
+pub(crate) const LEVELS: usize = 7;
 
 /// Start of a touch at a place: share of its events in each region.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,8 +32,8 @@ pub struct TouchModel {
     pub(crate) tail: Vec<[f64; 2]>,
     /// Longest calibration press, slots.
     pub(crate) longest_press: i64,
-    /// Expected events per slot at which touches are looked for, octaves.
-    pub(crate) octaves: (i32, i32),
+    /// Lowest event rate at which touches are looked for, octaves of one event per slot.
+    pub(crate) lowest_octave: i32,
 }
 
 impl TouchModel {
@@ -41,7 +43,7 @@ impl TouchModel {
         let octaves = libm::round(libm::log2(share)) as i32;
         Self {
             idle: [0, 1].map(|k| self.idle[k].iter().map(|rate| rate * share).collect()),
-            octaves: (self.octaves.0 + octaves, self.octaves.1 + octaves),
+            lowest_octave: self.lowest_octave + octaves,
             ..self.clone()
         }
     }

@@ -1,7 +1,5 @@
 //! The position of a touch at every instant: the events of its window so far, through the estimator and locator of the analysis.
 
-use std::collections::VecDeque;
-
 use serde::Serialize;
 use skinrig_analysis::Analysis;
 use skinrig_analysis::background::Background;
@@ -16,10 +14,9 @@ use skinrig_model::{
 };
 
 use crate::direction::Agreement;
+use crate::history::History;
 use crate::rise::{Count, Excess, RECENT_US, Rise};
 
-/// Newest events of each camera, to which a window can reach back: 2 MiB.
-const HISTORY: usize = 1 << 17;
 /// Events of a window in each camera: 32 MiB.
 const MOST: usize = 1 << 22;
 
@@ -78,9 +75,8 @@ struct CameraWindow {
     hot: HotPixelMask,
     thinning: Thinning,
     estimator: PressEstimator,
-    /// The newest events; at most [`HISTORY`].
-    history: VecDeque<CdEvent>,
-    forgotten_us: Option<u64>,
+    /// The newest events, to which a window can reach back.
+    history: History,
     from_us: Option<u64>,
     /// Of the idle time before the window.
     background: Background,
@@ -99,8 +95,7 @@ impl CameraWindow {
             hot: HotPixelMask::new(hot),
             thinning: Thinning::new(settings.thinning, camera, settings.seed),
             estimator: PressEstimator::new(settings, rows),
-            history: VecDeque::with_capacity(HISTORY),
-            forgotten_us: None,
+            history: History::new(),
             from_us: None,
             background: Background::default(),
             events: Vec::with_capacity(MOST),
@@ -122,42 +117,24 @@ impl CameraWindow {
             return;
         }
         if let Some(from_us) = self.from_us {
-            self.add(event, from_us);
+            add(&mut self.events, &mut self.complete, event, from_us);
         }
-        if self.history.len() == HISTORY {
-            let oldest = self.history.pop_front().map(|e| e.t_us);
-            self.forgotten_us = self.forgotten_us.max(oldest);
-        }
-        self.history.push_back(*event);
-    }
-
-    fn add(&mut self, event: &CdEvent, from_us: u64) {
-        if event.t_us < from_us {
-            return;
-        }
-        match PackedEvent::pack(event, from_us) {
-            Some(packed) if self.events.len() < MOST => self.events.push(packed),
-            _ => self.complete = false,
-        }
+        self.history.push(*event);
     }
 
     fn open(&mut self, Opening { idle_us, from_us }: Opening) {
         (self.from_us, self.in_order) = (Some(from_us), 0);
-        self.complete = self
-            .forgotten_us
-            .is_none_or(|forgotten| forgotten < idle_us.min(from_us));
-        let idle_us = self.forgotten_us.map_or(idle_us, |f| idle_us.max(f + 1));
-        self.events.clear();
-        let history = std::mem::take(&mut self.history);
-        history.iter().for_each(|event| self.add(event, from_us));
-        let idle = history
-            .iter()
-            .filter(|e| (idle_us..from_us).contains(&e.t_us));
+        let forgotten_us = self.history.forgotten_us();
+        self.complete = forgotten_us.is_none_or(|forgotten| forgotten < idle_us.min(from_us));
+        let idle_us = forgotten_us.map_or(idle_us, |f| idle_us.max(f + 1));
         self.background = Background {
-            events: idle.count() as u64,
+            events: self.history.count(&(idle_us..from_us)) as u64,
             idle_us: from_us.saturating_sub(idle_us),
         };
-        self.history = history;
+        self.events.clear();
+        for event in self.history.from(from_us) {
+            add(&mut self.events, &mut self.complete, event, from_us);
+        }
     }
 
     fn close(&mut self) {
@@ -190,6 +167,17 @@ impl CameraWindow {
             idle: self.background.events_in(recent_us),
             agreement: Agreement::of(&self.events[..earlier], &self.events[earlier..count]),
         }
+    }
+}
+
+/// Adds an event to those of a window that begins at `from_us`, if it is one of them and there is room.
+fn add(events: &mut Vec<PackedEvent>, complete: &mut bool, event: &CdEvent, from_us: u64) {
+    if event.t_us < from_us {
+        return;
+    }
+    match PackedEvent::pack(event, from_us) {
+        Some(packed) if events.len() < MOST => events.push(packed),
+        _ => *complete = false,
     }
 }
 

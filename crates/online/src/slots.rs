@@ -21,7 +21,7 @@ pub(crate) struct SlotCounts {
 }
 
 impl SlotCounts {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             counts: Box::new([0; REGIONS]),
             filled: Vec::with_capacity(REGIONS),
@@ -29,7 +29,7 @@ impl SlotCounts {
         }
     }
 
-    fn add(&mut self, region: usize) {
+    pub(crate) fn add(&mut self, region: usize) {
         let count = &mut self.counts[region];
         if *count == 0 {
             self.filled.push(region as u16);

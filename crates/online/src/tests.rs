@@ -42,7 +42,7 @@ fn first_column(place: usize) -> u16 {
     64 + 96 * place as u16
 }
 
-fn model() -> TouchModel {
+pub(crate) fn model() -> TouchModel {
     let pattern = |place: usize| {
         let mut counts = vec![0.0; REGIONS];
         for x in first_column(place)..first_column(place) + 64 {
@@ -71,7 +71,7 @@ fn model() -> TouchModel {
         patterns: (0..5).map(pattern).collect(),
         tail: Vec::new(),
         longest_press: 800,
-        octaves: (-2, 4),
+        lowest_octave: -2,
     }
 }
 
