@@ -293,12 +293,17 @@ fn settings(timing_slack: HostDuration) -> ControllerSettings {
 }
 
 impl Arm<'_> {
+    /// The speed at which a move that asks for `speed_mm_s` goes, mm/s: the rig may limit it.
+    pub(crate) fn speed_mm_s(&self, speed_mm_s: f64) -> f64 {
+        speed_mm_s.min(self.volume.limits.max_speed_mm_s)
+    }
+
     /// Moves to `target` and waits for arrival.
     ///
     /// # Errors
     /// [`Problem`] when the arm does not arrive, or when the suite must stop.
     pub fn go(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<PoseSample, Problem> {
-        let speed = speed_mm_s.min(self.volume.limits.max_speed_mm_s);
+        let speed = self.speed_mm_s(speed_mm_s);
         match self
             .jog
             .go(target, speed, self.stop)
@@ -328,7 +333,7 @@ impl Arm<'_> {
     /// # Errors
     /// [`Problem`] from the guard or the robot.
     pub fn send(&mut self, target: Point3<Skin>, speed_mm_s: f64) -> Result<HostTime, Problem> {
-        let speed = speed_mm_s.min(self.volume.limits.max_speed_mm_s);
+        let speed = self.speed_mm_s(speed_mm_s);
         self.jog.send(target, speed).map_err(from_controller)
     }
 

@@ -44,17 +44,21 @@ fn severity(ruling: &RuleResult) -> (Verdict, bool) {
     (ruling.verdict, ruling.cause != Some(Cause::Infrastructure))
 }
 
-/// Verdict of each part of an attempt at `check`, after the rules: INVALID for a device at fault, and for all parts if other checks
-/// made the check INVALID.
+/// Verdict of each part of an attempt at `check`, after the rules: INVALID for a device at fault, and that of the check for all parts
+/// if other checks made it INVALID or INCONCLUSIVE.
 #[must_use]
 pub fn part_verdicts(check: &CheckResult, attempt: &Attempt) -> Vec<Verdict> {
-    let by_others = check.verdict == Verdict::Invalid && attempt.verdict != Verdict::Invalid;
+    let by_others = match check.verdict {
+        Verdict::Invalid => attempt.verdict != Verdict::Invalid,
+        Verdict::Inconclusive => attempt.verdict.is_good() && !check.witnesses.is_empty(),
+        _ => false,
+    };
     let parts = attempt.parts.iter();
     let judged = parts.map(|part| {
         // The cause plays no part in it.
         let ruling = judge_part(part, &attempt.parts, &attempt.evidence, Cause::Rig);
         let own = part.verdict.max(ruling.verdict);
-        if by_others { Verdict::Invalid } else { own }
+        if by_others { check.verdict } else { own }
     });
     judged.collect()
 }

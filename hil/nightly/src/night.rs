@@ -19,7 +19,7 @@ pub struct Night {
     pub id: String,
     /// Name of the suite.
     pub suite: String,
-    /// SHA-256 of the suite's text.
+    /// SHA-256 of the suite's text, and of the protocols of its campaigns if it has any.
     pub suite_sha256: String,
     /// Name of the bench; contains `emulated` for an emulated one.
     pub rig: String,
@@ -173,6 +173,14 @@ impl Night {
     pub fn update_verdict(&mut self) {
         self.verdict = Verdict::worst(self.checks.iter().map(|c| c.verdict));
         self.exit = NightExit::of(self.checks.iter().map(|c| (c.verdict, c.cause)));
+    }
+
+    /// Marks a night whose files could not be written: it shows nothing to those who read them later, whatever it measured.
+    pub fn lose(&mut self, why: &str) {
+        self.finished = false;
+        self.ended_early = Some(format!("its files could not be written: {why}"));
+        self.verdict = self.verdict.max(Verdict::Fail);
+        self.exit = NightExit::Infrastructure;
     }
 
     /// Measurements of the last attempts, each with its series name: `check/subject/metric`.

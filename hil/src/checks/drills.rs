@@ -85,7 +85,8 @@ fn stop_twice(arm: &mut Arm<'_>, findings: &mut Findings) -> Result<(), Problem>
     // Switch the motors off, as an operator's third ctrl-C does. The arm cannot be armed afterwards.
     let halted = stop_between(arm, west, east, |arm| arm.halt())?;
     let note = format!(
-        "held: {:.0} ms, {:.2} mm; motors off: {:.0} ms, {:.2} mm",
+        "at {} mm/s; held: {:.0} ms, {:.2} mm; motors off: {:.0} ms, {:.2} mm",
+        arm.speed_mm_s(TRAVEL_MM_S),
         held.within_s * 1e3,
         held.distance_mm,
         halted.within_s * 1e3,

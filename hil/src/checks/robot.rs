@@ -226,7 +226,8 @@ fn measure_steps(
     if let Some(median) = settling.get(n / 2) {
         findings
             .value(ROBOT, "settling", *median)
-            .with_samples(n, 3);
+            .with_samples(n, 3)
+            .with_note(format!("at {} mm/s", arm.speed_mm_s(TRAVEL_MM_S)));
         findings
             .value(ROBOT, "overshoot", most(|r| r.overshoot_mm))
             .with_samples(n, 3);

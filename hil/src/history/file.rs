@@ -43,6 +43,13 @@ pub(super) async fn open(path: &Path, create: bool) -> Result<SqliteConnection, 
             path: path.to_owned(),
         });
     }
+    if let Some(folder) = path.parent().filter(|_| create) {
+        std::fs::create_dir_all(folder).map_err(|source| HistoryError::Io {
+            path: folder.to_owned(),
+            doing: "creating the folder",
+            source,
+        })?;
+    }
     let mut conn = SqliteConnectOptions::new()
         .filename(path)
         .create_if_missing(create)

@@ -1,5 +1,7 @@
 //! `skinrig hil accept`: records that an operator accepts a change, with a reason.
 
+use std::path::Path;
+
 use chrono::{SecondsFormat, Utc};
 use skinrig_hil::history;
 use skinrig_nightly::trend::{Acceptance, Filter};
@@ -37,6 +39,14 @@ pub(crate) fn accept(args: &HilAcceptArgs, json: bool) -> Outcome {
             "{}: the reference restarts at night {}",
             acceptance.series.as_deref().unwrap_or("all series"),
             acceptance.night
+        );
+    }
+    if std::env::var_os("SKINRIG_CATALOGUE").is_some_and(|a| !a.is_empty()) {
+        let folder = args.history.parent().filter(|f| !f.as_os_str().is_empty());
+        errln!(
+            "note: this is in {}; a catalogue knows of it after `skinrig catalogue register --nights {}`",
+            args.history.display(),
+            folder.unwrap_or(Path::new(".")).display()
         );
     }
     Ok(Exit::Ok)

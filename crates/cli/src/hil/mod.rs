@@ -5,6 +5,7 @@ mod alarms;
 pub(crate) mod args;
 pub(crate) mod bench;
 mod campaign;
+mod contradictions;
 mod drill;
 pub(crate) mod hold;
 pub(crate) mod lease;

@@ -4,6 +4,7 @@ use std::io;
 use std::path::Path;
 
 use chrono::{SecondsFormat, Utc};
+use sha2::{Digest as _, Sha256};
 use skinrig_device::RealClock;
 use skinrig_hil::history::HistoryError;
 use skinrig_hil::night_folder::{self, NightFolder};
@@ -22,7 +23,7 @@ use super::args::HilRunArgs;
 use super::live::{self, NightProgress};
 use super::real_bench::RealBench;
 use super::trend::NightTrends;
-use super::{lease, messages, trend};
+use super::{contradictions, lease, messages, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::host::host_name;
@@ -45,6 +46,7 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     bench::refuse_without_sample(&rig)?;
     inputs::check(&rig)?;
     known_checks(&suite, args.only.as_deref())?;
+    contradictions::refuse(&suite, &rig, args.only.as_deref())?;
     let settings = suite.notify.as_ref().map(|n| (&suite.file_name, n));
     let settings = settings.or_else(|| rig.notify.as_ref().map(|n| (&rig.file_name, n)));
     let notifier = settings.map(|(file, settings)| notify::open(settings, file));
@@ -86,17 +88,23 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     let mut bench =
         RealBench::new(rig, folder.path().to_owned(), operator, command_line).holding(lease);
     let mut night = runner.run(night, &mut bench, &mut live);
-    let mut write_error = live.finish();
+    let write_error = live.finish();
     bench.close();
     bench.propose();
     drop(bench);
-    let trends = keep(&night, &folder, args.history.as_deref());
+    let mut trends = keep(&mut night, &folder, args.history.as_deref());
+    if let Some(e) = write_error {
+        trends = Err(NightFileError::Night(e));
+    }
+    if let Err(why) = &trends {
+        night.lose(&why.to_string());
+    }
     if let Some(notifier) = notifier {
         let after = trends.as_ref().ok().and_then(Option::as_ref);
         let after = after.and_then(|after| after.as_ref().ok());
         night.notifications = messages::send(notifier, &night, &folder, after);
         if let Err(e) = folder.write_json(&night) {
-            write_error.get_or_insert(e);
+            trends = Err(NightFileError::Night(e));
         }
     }
     if json {
@@ -104,24 +112,26 @@ pub(crate) fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome 
     } else {
         let paint = live::paint(&io::stdout());
         outln!("{}", night::tree(&night, paint).trim_end());
-        outln!("{}", folder.path().join(night_folder::PAGE).display());
+        if trends.is_ok() {
+            outln!("{}", folder.path().join(night_folder::PAGE).display());
+        }
     }
-    match write_error.map_or(trends, |e| Err(NightFileError::Night(e))) {
+    match trends {
         Ok(None) => Ok(Exit::Night(night.exit)),
-        // The exit code depends on the limits alone, not on trends.
-        Ok(Some(trends)) => {
-            match trends {
-                Ok(after) if !json => {
-                    outln!("{}", sentence(&after.report));
-                    outln!("{}", folder.path().join(night_folder::TRENDS).display());
-                }
-                Ok(_) => {}
-                Err(why) => errln!(
-                    "warning: no trends for this night: --history: {why}\n  \
-                     next: fix this, then add the night with `skinrig hil trend HISTORY --rebuild {}`",
-                    args.out.display()
-                ),
+        // The exit code depends on the limits alone, not on what the trends say.
+        Ok(Some(Ok(after))) => {
+            if !json {
+                outln!("{}", sentence(&after.report));
+                outln!("{}", folder.path().join(night_folder::TRENDS).display());
             }
+            Ok(Exit::Night(night.exit))
+        }
+        Ok(Some(Err(why))) => {
+            errln!(
+                "warning: no trends for this night: --history: {why}\n  \
+                 next: fix this, then add the night with `skinrig hil trend HISTORY --rebuild {}`",
+                args.out.display()
+            );
             Ok(Exit::Night(night.exit))
         }
         Err(why) => Err(Failure::rig(format!(
@@ -151,9 +161,10 @@ enum NightFileError {
     Junit(#[from] junit::SerializeError),
 }
 
-/// Writes the page and JUnit XML of the finished night, and adds it to the history.
+/// Writes the page and JUnit XML of the finished night, and adds it to the history. A night that no history takes ends with the
+/// exit code of the infrastructure, unless it has a worse one: trends that stop must not go unnoticed.
 fn keep(
-    night: &Night,
+    night: &mut Night,
     folder: &NightFolder,
     history: Option<&Path>,
 ) -> Result<TrendOutcome, NightFileError> {
@@ -162,25 +173,34 @@ fn keep(
             .write(name, text)
             .map_err(|source| NightFileError::File { name, source })
     };
-    let page = |trends: Trends<'_>| write(night_folder::PAGE, &night::html(night, trends));
+    let page =
+        |night: &Night, trends: Trends<'_>| write(night_folder::PAGE, &night::html(night, trends));
     write(night_folder::JUNIT, &junit::junit(night, &host_name())?)?;
     let Some(history) = history else {
-        page(Trends::NotRequested)?;
+        page(night, Trends::NotRequested)?;
         return Ok(None);
     };
     // The page exists even if reading the history fails.
-    page(Trends::Unavailable("the program ended before reading them"))?;
+    let ended = Trends::Unavailable("the program ended before reading them");
+    page(night, ended)?;
     let after = trend::after(history, night, folder.path());
     match &after {
         Ok(after) => {
             write(night_folder::TRENDS, &after.page())?;
-            page(Trends::Available {
+            let trends = Trends::Available {
                 report: &after.report,
                 links: &after.links,
                 page: night_folder::TRENDS,
-            })?;
+            };
+            page(night, trends)?;
         }
-        Err(why) => page(Trends::Unavailable(&why.to_string()))?,
+        Err(why) => {
+            if night.exit == NightExit::Pass {
+                night.exit = NightExit::Infrastructure;
+                folder.write_json(night).map_err(NightFileError::Night)?;
+            }
+            page(night, Trends::Unavailable(&why.to_string()))?;
+        }
     }
     Ok(Some(after))
 }
@@ -253,13 +273,34 @@ fn feels(protocol: &Protocol) -> Result<(), &'static str> {
     }
 }
 
+/// SHA-256 of the suite's text, and of the protocols of its campaigns if it has any: both say what is measured.
+fn digest(suite: &Suite) -> String {
+    let protocols = suite
+        .checks
+        .iter()
+        .filter_map(|check| match &check.measure {
+            Measure::Golden { protocol } | Measure::Reaction { protocol } => Some(protocol),
+            _ => None,
+        });
+    let protocols: Vec<_> = protocols.collect();
+    if protocols.is_empty() {
+        return suite.sha256.clone();
+    }
+    let mut hash = Sha256::new_with_prefix(&suite.text);
+    for protocol in protocols {
+        // Those of checks that run have been read before; that of a skipped one may be missing.
+        hash.update(std::fs::read(protocol).unwrap_or_default());
+    }
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
 /// A night before its first check.
 fn blank(id: String, suite: &Suite, rig: &RigFile, started: String) -> Night {
     Night {
         version: NIGHT_VERSION,
         id,
         suite: suite.name.clone(),
-        suite_sha256: suite.sha256.clone(),
+        suite_sha256: digest(suite),
         rig: bench::display_name(rig),
         rig_kind: rig.kind.name().to_owned(),
         rig_sha256: rig.sha256.clone(),

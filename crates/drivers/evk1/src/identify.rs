@@ -157,7 +157,10 @@ impl fmt::Display for CameraState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Ready(id) => write!(f, "EVK1 Gen3.1, serial {}, {}", id.serial, id.firmware()),
-            Self::Busy => write!(f, "in use by another program"),
+            Self::Busy => write!(
+                f,
+                "in use, by another program or as another camera of this one"
+            ),
             Self::NoPermission => write!(f, "no permission to open it"),
             Self::NotEvk1(what) => write!(f, "not an EVK1 Gen3.1: {what}"),
             Self::Faulty(what) => write!(f, "unexpected response: {what}"),

@@ -110,6 +110,9 @@ pub(super) fn why_in_words(check: &CheckResult) -> Option<String> {
 fn because(check: &CheckResult, witnesses: &[String]) -> Option<String> {
     let cause = check.cause?.name();
     let because = match (&check.rule, witnesses) {
+        (None, _) if check.verdict == Verdict::Inconclusive => {
+            "too few samples for a verdict".to_owned()
+        }
         (None, _) => "a limit was violated and no evidence explains it".to_owned(),
         (Some(rule), []) => reason(rule).unwrap_or_default().to_owned(),
         (Some(rule), some) => {

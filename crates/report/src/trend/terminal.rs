@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use skinrig_nightly::trend::report::format_number as number;
 use skinrig_nightly::trend::{Chart, Report, SeriesState};
 use skinrig_text::{
-    Blocks, Column as Cells, LongWords, Paint, Style as Look, WIDTH, cut, hang, sparkline, wrap,
+    Blocks, Column as Cells, LongWords, Paint, Style as Look, WIDTH, hang, sparkline, wrap,
 };
 
 use super::{Links, cause, moved_by, since, state, with_unit};
@@ -90,9 +90,11 @@ pub fn sentence(report: &Report) -> String {
 
 /// One row per series, under the identifiers that commands take.
 fn series(report: &Report, charts: &[&Chart], style: Style) -> Table {
+    let widths = charts.iter().map(|c| c.series.name.chars().count());
+    let name = widths.max().unwrap_or(0).max(NAME);
     let nights = format!("last {} nights", SPARK.min(style.nights));
     let columns = [
-        Column::of_terminals("series", Cells::left(NAME)),
+        Column::of_terminals("series", Cells::left(name)),
         Column::of_terminals(nights, Cells::left(SPARK)),
         Column::of_terminals("last", Cells::right(13)),
         Column::of_terminals("state", Cells::left(0).after(1)),
@@ -101,7 +103,7 @@ fn series(report: &Report, charts: &[&Chart], style: Style) -> Table {
         let last = chart.nights.last();
         let last = last.map(|n| with_unit(n.value, &chart.series.unit));
         let row = Row::new([
-            cut(&plain(&chart.series.name), NAME).to_owned(),
+            plain(&chart.series.name),
             spark(report, chart, style),
             last.unwrap_or_else(|| "-".to_owned()),
             match chart.state {

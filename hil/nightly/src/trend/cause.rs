@@ -28,12 +28,18 @@ enum Component {
     Skin,
 }
 
+/// Whether a series is of a check that presses the skin.
+fn touches_the_skin(series: &str) -> bool {
+    let check = series.split('/').next().unwrap_or_default();
+    series_cause(series) == Cause::Skin || matches!(check, "depth" | "force_ceiling")
+}
+
 /// Cause that a series points to, according to its check.
 #[must_use]
 pub(crate) fn series_cause(series: &str) -> Cause {
     let mut parts = series.split('/');
     match (parts.next().unwrap_or_default(), parts.next()) {
-        ("golden", _) | ("derived", Some("skin")) => Cause::Skin,
+        ("golden" | "reaction", _) | ("derived", Some("skin")) => Cause::Skin,
         ("disk", _) | (_, Some("computer")) => Cause::Infrastructure,
         _ => Cause::Rig,
     }
@@ -49,7 +55,7 @@ pub(super) fn attribute(
     let changed: Vec<String> = changes.iter().map(|(_, text)| text.clone()).collect();
     let has = |part| changes.iter().any(|(p, _)| *p == part);
     let all = |cause| series.iter().all(|s| series_cause(s) == cause);
-    let any = |cause| series.iter().any(|s| series_cause(s) == cause);
+    let needs_no_skin = |s: &&str| series_cause(s) == Cause::Rig && !touches_the_skin(s);
     let (cause, rule, reason) = if has(Component::Skin) && all(Cause::Skin) {
         (
             Some(Cause::Skin),
@@ -98,7 +104,13 @@ pub(super) fn attribute(
             "only-skin-series",
             "no version changed, and only series of the skin moved",
         )
-    } else if any(Cause::Rig) {
+    } else if series.iter().all(|s| touches_the_skin(s)) {
+        (
+            None,
+            "only-touching-series",
+            "no version changed, and only series of checks that press the skin moved: the skin, the arm or the frame",
+        )
+    } else if series.iter().any(needs_no_skin) {
         (
             Some(Cause::Rig),
             "rig-series",

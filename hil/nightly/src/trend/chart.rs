@@ -169,7 +169,8 @@ pub fn chart(
     }
     chart.reference = builder.reference;
     builder.finish(&mut chart);
-    let next = chart.nights.last().map_or(0, |n| n.night + 1);
+    let first = series.points.first().map_or(0, |p| p.night);
+    let next = chart.nights.last().map_or(first, |n| n.night + 1);
     chart.unmeasured_nights = nights.len().saturating_sub(next);
     chart.state = chart.state(nights);
     chart
@@ -346,11 +347,11 @@ impl Chart {
         if self.open_excursion().is_some() {
             return SeriesState::Moved;
         }
-        if self.reference.is_none() {
-            return SeriesState::Learning;
-        }
         if self.unmeasured_nights < UNMEASURED_NIGHTS {
-            return SeriesState::Steady;
+            return match self.reference {
+                Some(_) => SeriesState::Steady,
+                None => SeriesState::Learning,
+            };
         }
         let asked = self.series.points.last().and_then(|p| nights.get(p.night));
         let suites = asked.zip(nights.last());

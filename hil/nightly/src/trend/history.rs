@@ -27,7 +27,7 @@ pub struct NightSummary {
     pub started: String,
     /// Name of the suite.
     pub suite: String,
-    /// SHA-256 of the suite's text.
+    /// As in [`Night::suite_sha256`].
     pub suite_sha256: String,
     /// Name of the bench.
     pub rig: String,

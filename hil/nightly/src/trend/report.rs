@@ -249,7 +249,13 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightSummary]) -> Stri
         if let Some(silent) = silent {
             return format!("not known whether all is steady: {silent}; nothing else moved");
         }
-        let learning = charts.iter().filter(|c| c.reference.is_none()).count();
+        let in_state = |state| charts.iter().filter(|c| c.state == state).count();
+        let learning = in_state(SeriesState::Learning);
+        let dropped = match in_state(SeriesState::Dropped) {
+            0 => String::new(),
+            n => format!("; the suite no longer measures {n} more"),
+        };
+        let asked = charts.len() - in_state(SeriesState::Dropped);
         return if charts.is_empty() {
             "no trends: no night has a usable value yet".to_owned()
         } else if learning == charts.len() {
@@ -259,15 +265,13 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightSummary]) -> Stri
             )
         } else if learning > 0 {
             format!(
-                "nothing moved in {} nights; {learning} of {} series are still learning their reference",
+                "nothing moved in {} nights; {learning} of {asked} series are still learning their reference{dropped}",
                 nights.len(),
-                charts.len()
             )
         } else {
             format!(
-                "nothing moved in {} nights ({} series)",
+                "nothing moved in {} nights ({asked} series){dropped}",
                 nights.len(),
-                charts.len()
             )
         };
     };
@@ -316,7 +320,11 @@ fn silent(charts: &[Chart], nights: &[NightSummary]) -> Option<String> {
         .map_or_else(String::new, |other| {
             format!(" in {}, now in {},", first.series.unit, other.series.unit)
         });
-    let last = &nights[first.nights.last()?.night];
+    let since = match (first.nights.last(), first.series.points.first()) {
+        (Some(last), _) => format!("since {}", day(&nights[last.night])),
+        (None, Some(asked)) => format!("ever since {}", day(&nights[asked.night])),
+        (None, None) => return None,
+    };
     let others = match silent.len() - 1 {
         0 => String::new(),
         n => format!(
@@ -325,10 +333,8 @@ fn silent(charts: &[Chart], nights: &[NightSummary]) -> Option<String> {
         ),
     };
     Some(format!(
-        "{}{unit} has had no usable value since {} ({} nights){others}",
-        first.series.name,
-        day(last),
-        first.unmeasured_nights
+        "{}{unit} has had no usable value {since} ({} nights){others}",
+        first.series.name, first.unmeasured_nights
     ))
 }
 

@@ -5,7 +5,7 @@ mod pairs;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 use serde_json::Value;
 use skinrig_emulated_bench::{ArmFault, BenchConfig, BenchError, EmulatedBench, When};
@@ -131,16 +131,7 @@ impl Nights {
     }
 
     fn night_in(&self, only: &str, out: &Path) -> NightResult {
-        let place = |name: &str| self.folder.path().join(name);
-        let mut command: Command = self.bench.command(SKINRIG).unwrap();
-        command
-            .args(["hil", "run", "--json", "--only", only])
-            .arg(place("suite.yaml"))
-            .arg("--rig")
-            .arg(place("rig.yaml"))
-            .arg("--out")
-            .arg(out);
-        let output = command.output().unwrap();
+        let output = self.output(only, out, &[]);
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         let night = serde_json::from_slice(&output.stdout)
             .unwrap_or_else(|e| panic!("{e}: {} {stderr}", output.status));
@@ -149,6 +140,20 @@ impl Nights {
             night,
             stderr,
         }
+    }
+
+    fn output(&self, only: &str, out: &Path, more: &[&str]) -> Output {
+        let place = |name: &str| self.folder.path().join(name);
+        let mut command: Command = self.bench.command(SKINRIG).unwrap();
+        command
+            .args(["hil", "run", "--json", "--only", only])
+            .arg(place("suite.yaml"))
+            .arg("--rig")
+            .arg(place("rig.yaml"))
+            .arg("--out")
+            .arg(out)
+            .args(more);
+        command.output().unwrap()
     }
 
     fn write_rig(&self, text: &str) {
@@ -357,4 +362,31 @@ fn fill_a_disk() {
     };
     let observed = nights.night_in("disk", &tiny.0);
     observed.assert_check(3, "disk", "FAIL", "infrastructure", &[("disk", "computer")]);
+}
+
+#[test]
+fn a_suite_beyond_the_limits_of_the_rig_and_a_history_that_is_none_are_told() {
+    in_real_time(contradict_the_rig);
+}
+
+fn contradict_the_rig() {
+    let Some(nights) = Nights::start() else {
+        return;
+    };
+    let (history, out) = (
+        nights.folder.path().join("h.sqlite"),
+        nights.folder.path().join("out"),
+    );
+    fs::write(&history, "no history").unwrap();
+    let assert_told = |only: &str, exit: i32, told: &str| {
+        let output = nights.output(only, &out, &["--history", history.to_str().unwrap()]);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(stderr.contains(told), "{stderr}");
+        assert_eq!(output.status.code(), Some(exit), "{stderr}");
+    };
+    assert_told("robot_state", 3, "no trends for this night");
+    nights.edit_rig("max_speed: 100 mm/s", "max_speed: 20 mm/s");
+    let told = "checks.repeatability.speed: expected at most 20 mm/s, `limits.max_speed` of";
+    assert_told("repeatability", 2, told);
+    assert_told("robot_state", 3, "no trends for this night");
 }

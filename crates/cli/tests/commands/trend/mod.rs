@@ -523,7 +523,7 @@ fn nights_that_are_dated_before_others_are_not_taken_for_the_newest() {
     nights.add_dated("2099-01-01");
     let (ran, folder) = nights.run(&["--history", &nights.history]);
     let dated = "the newest one there, found one of";
-    ran.code(0)
+    ran.code(3)
         .expect_stderr(&["no trends for this night", "2099-01-01T02:00:00Z", dated]);
     assert_contains(&read(&folder.join("night.html")), &[dated]);
     let all = nights.lab.text("nights");
@@ -562,8 +562,9 @@ fn a_night_without_trends_gives_the_reason_and_is_still_judged() {
 
     std::fs::write(nights.lab.path("notes.txt"), "name,value\n").unwrap();
     let (ran, folder) = nights.run(&["--history", &nights.lab.text("notes.txt")]);
-    let ran = ran.code(0);
+    let ran = ran.code(3);
     assert!(!ran.out.contains("trend"), "{ran:#?}");
+    assert!(ran.out.contains("exit 3"), "{ran:#?}");
     ran.expect_stderr(&[
         "no trends for this night",
         "a file that is not SQLite",

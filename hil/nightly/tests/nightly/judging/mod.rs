@@ -60,6 +60,19 @@ fn trends_leave_out_what_the_rules_made_invalid() {
     assert_eq!(usable(Verdict::Invalid, &good), [None, None]);
     let made = check("trigger_loopback", Verdict::Invalid, None);
     assert_eq!(part_verdicts(&made, &good), [Verdict::Invalid; 2]);
+    // An earlier attempt was inconclusive, or another check makes this one so.
+    let mut made = check("depth", Verdict::Inconclusive, Some(Cause::Rig));
+    assert_eq!(part_verdicts(&made, &good), [Verdict::Pass; 2]);
+    made.witnesses = vec!["repeatability".to_owned()];
+    assert_eq!(part_verdicts(&made, &good), [Verdict::Inconclusive; 2]);
+    // A suite that was stopped.
+    let stopped = judge_attempt(
+        (0.0, 1.0),
+        vec![measured_in("camera1", 0.4)],
+        vec![self::evidence(EvidenceKind::Stopped, "computer")],
+        Cause::Rig,
+    );
+    assert_eq!(usable(Verdict::Inconclusive, &stopped), [None]);
 }
 
 /// Verdict and cause of an exceeded limit of a skin check, with one piece of evidence.

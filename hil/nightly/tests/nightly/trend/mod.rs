@@ -170,6 +170,10 @@ fn change_is_dated_and_attributed_by_simultaneous_changes() {
 
     let report = judge(&with_quarter_lower(&["noise_lit/camera1/rate", EVENTS]));
     assert_eq!(report.alarms[0].attribution.cause, Some(Cause::Rig));
+    // What presses the skin does not clear it.
+    let report = judge(&with_quarter_lower(&["depth/robot/height", EVENTS]));
+    assert_eq!(report.alarms[0].attribution.rule, "only-touching-series");
+    assert_eq!(report.alarms[0].attribution.cause, None);
 }
 
 #[test]
@@ -377,6 +381,19 @@ fn a_series_without_values_is_not_called_steady() {
         // The first after the alarms.
         assert_eq!(report.charts[0].state, SeriesState::NotMeasured);
     }
+    // A series that never got as far as a reference, or never had a value, says as little.
+    for measured in [0, 5] {
+        let mut history = Bench::new(3).history(40);
+        let nights = history.nights.len();
+        for night in measured..nights {
+            spoil(&mut history, EVENTS, night, false);
+        }
+        let report = judge(&history);
+        let silent = chart(&report, EVENTS);
+        assert_eq!(silent.state, SeriesState::NotMeasured, "{measured}");
+        assert!(report.headline.contains(EVENTS), "{}", report.headline);
+        assert_eq!(report.headline.contains("ever since"), measured == 0);
+    }
     // Two such nights happen: a device at fault.
     let report = ending(2, |h, night| spoil(h, LOCATED, night, true));
     assert_eq!(chart(&report, LOCATED).state, SeriesState::Steady);
@@ -396,6 +413,8 @@ fn checks_that_are_no_longer_made_are_missed_unless_the_suite_changed() {
     });
     assert_eq!(chart(&report, EVENTS).state, SeriesState::Dropped);
     assert!(!report.headline.contains(EVENTS), "{}", report.headline);
+    let told = "the suite no longer measures 1 more";
+    assert!(report.headline.contains(told), "{}", report.headline);
 }
 
 #[test]
