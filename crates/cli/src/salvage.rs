@@ -37,6 +37,10 @@ pub(crate) fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
     }
     let (word, session, to) = (shell_path(&to), args.session.display(), to.display());
     Err(Failure::limit(match &report.changed[..] {
+        [] if report.contradictions > 0 => format!(
+            "{session}: values contradict each other although nothing is lost: the file was changed\n  next: restore the session from \
+             a copy; use no results of {to}"
+        ),
         [] => format!(
             "{session}: some data are lost, as listed\n  next: `skinrig show {}` and `skinrig analyze` work on what was \
              recovered; keep the damaged file",

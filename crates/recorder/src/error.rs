@@ -84,6 +84,16 @@ pub enum RecorderError {
         /// Number of contradictions.
         problems: u64,
     },
+    /// A new annotation is not one that a log can hold.
+    #[error(
+        "expected {expected} in the tags, the remark and its author, found {found}; nothing was written"
+    )]
+    UnusableAnnotation {
+        /// What was expected.
+        expected: &'static str,
+        /// What was found.
+        found: String,
+    },
     /// The session to resume fails verification. Nothing in it was changed.
     #[error("{}: expected a sound session to resume, found {} problem(s): {}; nothing was changed: `skinrig salvage` copies \
         the intact parts into a new session", path.display(), problems.len() as u64 + more_problems, join(problems))]

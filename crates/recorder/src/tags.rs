@@ -171,11 +171,11 @@ pub fn annotations(session: &Path, session_id: &str) -> Result<Annotations, Reco
 /// Appends an annotation to the log beside `session`, durably; returns all annotations.
 ///
 /// # Errors
-/// As [`annotations`], for the existing log and for the new line; nothing is written then.
+/// As [`annotations`], for the existing log; [`RecorderError::UnusableAnnotation`] for the new line; nothing is written then.
 pub fn annotate(session: &Path, annotation: &Annotation) -> Result<Annotations, RecorderError> {
     let path = tags_path(session);
     if let Some((expected, found)) = annotation.fault(&annotation.session_id) {
-        return Err(damaged(&path, 0, expected, found));
+        return Err(RecorderError::UnusableAnnotation { expected, found });
     }
     annotations(session, &annotation.session_id)?;
     let io = |source| RecorderError::Io {

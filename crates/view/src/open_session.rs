@@ -6,7 +6,7 @@ use std::time::SystemTime;
 
 use skinrig_analysis::{Analysis, LegStart};
 use skinrig_model::{CameraId, HostTime, PlannedPress, RunHeader};
-use skinrig_recorder::{AttemptRow, ChunkMeta, LegRow, SessionReader};
+use skinrig_recorder::{AttemptRow, ChunkMeta, LegRow, SessionReader, writer_of};
 use skinrig_results::{AnalysisOptions, ChunkIndex, RigDocument, Session};
 
 use crate::clocks::CameraTime;
@@ -92,6 +92,10 @@ impl Cache {
             Some(known) => known,
             None => {
                 let unchanged = SessionReader::open_unchanged(path)?;
+                // Nothing seals it, and nobody is writing it: its rows must agree, as for an analysis.
+                if unchanged.seal()?.is_none() && writer_of(path).is_none() {
+                    SessionReader::open_checked(path)?;
+                }
                 Arc::new(ParsedSession::read(&unchanged, lab, path, variant)?)
             }
         };

@@ -147,11 +147,12 @@ pub(crate) enum StopRule {
 
 /// A length above 0 or a time above 0.
 pub(super) fn stop_rule(text: &str) -> Result<StopRule, ValueError> {
-    length_mm(text).map(StopRule::Region).or_else(|_| {
-        let quantity = quantity::parse(text, &[Dimension::Length, Dimension::Time]);
-        quantity.map_err(ValueError::Quantity)?;
-        time_s(text).map(|s| StopRule::After(s * 1e3))
-    })
+    let either = [Dimension::Length, Dimension::Time];
+    quantity::parse(text, &either).map_err(ValueError::Quantity)?;
+    match quantity::parse(text, &[Dimension::Length]) {
+        Ok(_) => length_mm(text).map(StopRule::Region),
+        Err(_) => time_s(text).map(|s| StopRule::After(s * 1e3)),
+    }
 }
 
 /// Presses and a reason.

@@ -20,7 +20,7 @@ use crate::analysis_request::AnalysisRequest;
 use crate::args::{ChallengeArgs, ChallengeCommand, ExamineArgs, MakeArgs, ScoreArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export::refused;
-use crate::paths::beside;
+use crate::paths::{beside, shell_path};
 use crate::results::{self, Results};
 use crate::selection::result::SelectedResult;
 use crate::selection::{self, Target};
@@ -131,8 +131,15 @@ fn make(args: &MakeArgs, json: bool) -> Outcome {
         }),
         salt: salt()?,
     };
-    let challenge_files =
-        challenge::make(&source, &args.out, answers, &making, &mut events).map_err(failure)?;
+    let challenge_files = challenge::make(&source, &args.out, answers, &making, &mut events)
+        .map_err(|e| match e {
+            ChallengeError::InvalidSession { .. } => Failure::limit(format!(
+                "{}: {e}\n  next: `skinrig show {}` lists the findings",
+                target.path.display(),
+                shell_path(&target.path)
+            )),
+            e => failure(e),
+        })?;
     if json {
         print_document(serde_json::json!(challenge_files), selected.as_ref());
     } else {

@@ -115,6 +115,12 @@ fn estimates_are_scored_with_regions_and_without() {
     assert!(near(&metrics["rmse_mm"]["low"], 3.0) && near(&metrics["bias_x_mm"]["value"], 3.0));
     assert_eq!(metrics["located_rate"]["value"], 1.0);
     assert!(output["coverage"].is_null());
+    // As tables with an empty cell are written.
+    let real = truths
+        .iter()
+        .map(|(press, x, y)| format!("{press}.0,{x},{y}"));
+    let output = challenge.score(&table("press,x_mm,y_mm", real));
+    assert_eq!(output["metrics"]["rmse_mm"]["value"], 0.0);
     // One is not located; of the others, the region holds two.
     let header = "press,x_mm,y_mm,region_major_mm,region_minor_mm,region_angle_deg";
     let regions = ["4,1,0", "4,1,180", "4,1,90"];
@@ -207,6 +213,24 @@ fn order_and_hash_follow_from_random_bytes_and_the_origin_is_stated() {
     );
     assert!(command.iter().all(|(_, salt)| salt.len() == 64));
     assert_ne!(command[0].1, command[1].1);
+    // The answers of a challenge that was given away stay.
+    let other = challenge.lab.text("other");
+    let command = [
+        "challenge",
+        "make",
+        &session,
+        "--out",
+        &other,
+        "--answers",
+        &answers,
+    ];
+    for more in [&[][..], &["--overwrite"]] {
+        skinrig(&[&command[..], more].concat())
+            .code(2)
+            .expect_stderr(&["found others", "another file with --answers"]);
+    }
+    let own = challenge.lab.text("own.json");
+    skinrig(&[&command[..6], &[&own]].concat()).code(0);
 }
 
 #[test]
@@ -238,6 +262,10 @@ fn a_wrong_table_is_refused_with_its_row() {
     challenge.refuses(
         &changed(1, format!("{given},{x},{y}")),
         &["row 3", "calibrates"],
+    );
+    challenge.refuses(
+        &changed(1, format!("1.5,{x},{y}")),
+        &["row 3", "the number of a press", "1.5"],
     );
     challenge.refuses(
         &changed(1, format!("{press},NaN,{y}")),
@@ -295,9 +323,11 @@ fn an_invalid_session_makes_no_challenge() {
         "--out",
         &text(&folder),
     ];
-    skinrig(&arguments)
-        .code(2)
-        .expect_stderr(&["found an INVALID one"]);
+    skinrig(&arguments).code(4).expect_stderr(&[
+        &text(&session),
+        "found an INVALID one",
+        "skinrig show",
+    ]);
     assert!(!folder.exists());
 }
 

@@ -1,6 +1,9 @@
 //! Damaged session files are detected, never trusted, and never cause a panic.
 
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 use crate::catalogue::change;
 use crate::support::{Lab, ProgramOutput, SeededRandom, read_json, skinrig, text};
@@ -117,8 +120,45 @@ fn measured_positions_that_the_poses_contradict_are_reported() {
             change(&session, undo);
         }
     }
-    // No seal makes it sound again.
+    // No seal makes it sound again, and no copy.
     assert_ne!(skinrig(&["resume", &path]).code, Some(0));
+    let copy = lab.text("copy.session.sqlite");
+    let salvaged = skinrig(&["salvage", &path, "--out", &copy]).code(4);
+    assert!(
+        salvaged.out.contains("a value contradicts others: "),
+        "{}",
+        salvaged.out
+    );
+    salvaged.expect_stderr(&["nothing is lost", "restore the session from a copy"]);
+    let shown = viewed(&session);
+    assert!(shown.contains("expected rows that agree"), "{shown}");
+}
+
+/// Answer of the page of `skinrig view` about a session.
+fn viewed(session: &Path) -> String {
+    let mut server = Command::new(env!("CARGO_BIN_EXE_skinrig"))
+        .arg("view")
+        .arg(session.parent().unwrap())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(server.stdout.take().unwrap()).lines();
+    let link = lines
+        .map_while(Result::ok)
+        .find(|line| line.starts_with("http://"));
+    let link = link.unwrap();
+    let (host, token) = link["http://".len()..].split_once("/#token=").unwrap();
+    let name = session.file_name().unwrap().to_string_lossy();
+    let mut stream = TcpStream::connect(host).unwrap();
+    let request = format!(
+        "GET /api/session?session={name} HTTP/1.1\r\nHost: {host}\r\nAuthorization: Bearer {token}\r\nConnection: close\r\n\r\n"
+    );
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    server.kill().unwrap();
+    server.wait().unwrap();
+    answer
 }
 
 /// RMSE of the results at `path`, mm.

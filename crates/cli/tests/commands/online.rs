@@ -302,5 +302,8 @@ fn a_session_without_calibration_presses_teaches_nothing() {
         "next: `skinrig show",
     ]);
     skinrig(&["online", &session, "--stop-at", "2"]).code(2);
+    skinrig(&["online", &session, "--stop-at", "0mm"])
+        .code(2)
+        .expect_stderr(&["a length above 0"]);
     skinrig(&["online", &session, "--speed", "0"]).code(2);
 }

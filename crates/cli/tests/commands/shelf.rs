@@ -24,6 +24,9 @@ fn fill(lab: &Lab) -> &'static str {
     let [first, second] = of_test_skin(lab);
     let variant = ["--set", "analysis.min_samples=6", "--name", "six"];
     skinrig(&[&["analyze", &first][..], &variant].concat()).code(0);
+    skinrig(&["tag", &first, "--note", "two\nlines"])
+        .code(2)
+        .expect_stderr(&["no control characters", "nothing was written"]);
     skinrig(&["tag", &first, "wet", "--note", "lamp", "--by", "Ann"]).code(0);
     // Results that cannot be used: those of another session.
     let results = |session: &str| session.replace(".session.sqlite", ".results.json");

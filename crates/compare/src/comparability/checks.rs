@@ -274,7 +274,7 @@ fn check_locations(subjects: &[Subject], locations: &Locations) -> Option<Differ
         let reason = "errors vary over the skin, and fewer than two locations are shared";
         return Some(as_blocking(
             difference("locations", "locations", Severity::Blocking, values, reason),
-            "press the same path on both skins, or compare them as independent samples with --despite locations",
+            "press the same path on both skins",
         ));
     }
     let reason = "only shared locations are compared";

@@ -54,7 +54,7 @@ pub struct Answer {
     pub session_press: u32,
     /// Number of its location, for intervals.
     pub location: u32,
-    /// Planned depth, mm.
+    /// Planned depth, or the measured one if the press ended before it, mm.
     pub depth_mm: f64,
     /// Measured position, mm.
     pub x_mm: f64,

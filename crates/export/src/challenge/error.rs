@@ -37,6 +37,18 @@ pub enum ChallengeError {
         /// A file that does not belong to it.
         path: PathBuf,
     },
+    /// The answers of another challenge are there.
+    #[error(
+        "{}: expected no file, or the answers of the challenge in {} to be replaced with it, found others: without them their challenge \
+         can never be scored\n  next: choose another file with --answers",
+        path.display(), folder.display()
+    )]
+    AnswersOfAnother {
+        /// The file of answers.
+        path: PathBuf,
+        /// Folder of the new challenge.
+        folder: PathBuf,
+    },
     /// The answers would lie in the folder that is given away.
     #[error("{}: the answers would lie in the folder of the challenge\n  next: choose another file with --answers", path.display())]
     Unsealed {
@@ -111,6 +123,14 @@ pub enum EstimateError {
         row: u64,
         /// The column.
         column: &'static str,
+        /// The cell.
+        found: String,
+    },
+    /// A press has no number.
+    #[error("row {row}: press: expected the number of a press of the challenge, found `{found}`")]
+    NotAPress {
+        /// The row.
+        row: u64,
         /// The cell.
         found: String,
     },

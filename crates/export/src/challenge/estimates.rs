@@ -93,11 +93,13 @@ impl Row<'_> {
     }
 
     fn press(&self, at: usize) -> Result<u32, EstimateError> {
-        self.cell(at)
-            .parse()
-            .map_err(|_| EstimateError::NotANumber {
+        // Tables with an empty cell write whole numbers as 1.0.
+        let value = self.cell(at).parse::<f64>().ok();
+        let whole = value.filter(|v| v.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(v));
+        whole
+            .map(|v| v as u32)
+            .ok_or_else(|| EstimateError::NotAPress {
                 row: self.number,
-                column: COLUMNS[0],
                 found: self.cell(at).to_owned(),
             })
     }

@@ -22,6 +22,8 @@ use crate::table::{Column, Kind, Layout, Table, TableWriter, Values};
 /// Events from this long before the contact to this long after the release, µs; less if a press has less of its own. All presses have the
 /// same margin: events that two presses share, and margins that follow from pauses, would tell their order, and with it their places.
 const MARGIN_US: f64 = 500_000.0;
+/// A press that ended this far above its planned depth was stopped, mm.
+const STOPPED_MM: f64 = 0.1;
 
 /// Description of a challenge, for people and programs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -97,6 +99,8 @@ pub struct ChallengeFiles {
 pub(super) struct Press<'a> {
     pub row: &'a PressResult,
     timing: PressTiming,
+    /// Planned depth, or the measured one if the press ended before it, mm.
+    depth_mm: f64,
     /// Before the contact and after the release, µs; the same for all.
     margin_us: f64,
     pub truth: Point2,
@@ -165,6 +169,16 @@ pub fn make(
             path: answers.to_owned(),
         });
     }
+    if let Ok(found) = std::fs::read(answers) {
+        let replaced = Description::read(folder).ok();
+        let is_its_own = replaced.is_some_and(|old| old.answers_sha256 == hash(&found));
+        if !making.overwrite || !is_its_own {
+            return Err(ChallengeError::AnswersOfAnother {
+                path: answers.to_owned(),
+                folder: folder.to_owned(),
+            });
+        }
+    }
     let stem = answers.file_name().unwrap_or_default().to_string_lossy();
     let sealed = Folder::new(parent, &stem, making.overwrite)?;
     let numbered = (1..).zip(&presses).filter(|(_, p)| p.is_scored());
@@ -229,6 +243,17 @@ pub(super) fn chosen<'a>(
             scored,
         });
     }
+    let journal = source.reader.presses().map_err(ExportError::from)?;
+    for press in &mut presses {
+        let attempts = journal
+            .iter()
+            .find(|(planned, _)| planned.id == press.row.press);
+        let last = attempts.and_then(|(_, attempts)| attempts.last());
+        let measured_mm = last.and_then(|a| a.outcome.as_ref()?.measured_depth_mm);
+        if let Some(mm) = measured_mm.filter(|mm| *mm < press.depth_mm - STOPPED_MM) {
+            press.depth_mm = mm;
+        }
+    }
     let margin_us = margin_us(source, &presses, &analysis.presses)?;
     for press in &mut presses {
         press.margin_us = margin_us;
@@ -264,7 +289,7 @@ pub(super) fn answers_about(
                 press: *press,
                 session_press: p.row.press.number(),
                 location: p.row.location.index(),
-                depth_mm: p.row.depth_mm,
+                depth_mm: p.depth_mm,
                 x_mm: p.truth.x_mm,
                 y_mm: p.truth.y_mm,
             })
@@ -286,6 +311,7 @@ fn shuffled(rows: &[PressResult], salt: [u8; 32]) -> Vec<Press<'_>> {
         Some(Press {
             row,
             timing,
+            depth_mm: row.depth_mm,
             margin_us: MARGIN_US,
             truth: row.truth?,
         })
@@ -371,7 +397,7 @@ fn press_table(presses: &[Press<'_>]) -> Table {
     let columns = [
         ("press", Values::Int((1..=presses.len() as i64).collect())),
         ("role", Values::Text(names.collect())),
-        ("depth_mm", real(&|p| Some(p.row.depth_mm))),
+        ("depth_mm", real(&|p| Some(p.depth_mm))),
         (
             "release_s",
             real(&|p| Some((p.timing.release.0 - p.timing.contact.0) as f64 * 1e-9)),

@@ -22,8 +22,10 @@ use crate::error::RecorderError;
 use crate::hex::hex;
 use crate::object::SessionReference;
 use crate::query::Fault;
+use crate::reader::SessionReader;
 use crate::schema;
 use crate::sidecar::{reject_special_files, sidecar_path};
+use crate::verify::check_unsealed;
 
 use self::pages::Pages;
 use self::report::io;
@@ -50,7 +52,7 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
     let log = sidecar_path(from, "-wal");
     let source_sha256 = sha256_of(from)?;
     let mut pages = Pages::open(from, &log).map_err(|e| io(from, "reading it", e))?;
-    runtime.block_on(async {
+    let mut report = runtime.block_on(async {
         let mut conn = schema::create(to).await?;
         let fault = |e: Fault| e.at(to, "writing the salvaged rows");
         let shapes = shapes::shapes(&mut conn).await.map_err(fault)?;
@@ -99,8 +101,33 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
             .map_err(|e| e.at(from, to))?;
         use sqlx::Connection;
         conn.close().await.map_err(|e| fault(e.into()))?;
-        Ok(report)
-    })
+        Ok::<_, RecorderError>(report)
+    })?;
+    find_contradictions(to, &mut report)?;
+    Ok(report)
+}
+
+/// Compares the rows of the new file with each other: numbers of an unsealed session have no checksum, but the poses have.
+fn find_contradictions(to: &Path, report: &mut SalvageReport) -> Result<(), RecorderError> {
+    let checked = SessionReader::open(to).and_then(|reader| check_unsealed(&reader));
+    match checked {
+        Err(RecorderError::Contradictory {
+            first, problems, ..
+        }) => {
+            if report.is_whole() {
+                report.contradictions = problems;
+            }
+            let others = match problems {
+                1 => "a value contradicts others".to_owned(),
+                n => format!("{n} values contradict others, the first"),
+            };
+            report.findings.push(format!("{others}: {first}"));
+            Ok(())
+        }
+        // A header that is lost is among the losses.
+        Err(e) if e.is_system_failure() => Err(e),
+        _ => Ok(()),
+    }
 }
 
 fn sha256_of(path: &Path) -> Result<String, RecorderError> {

@@ -18,6 +18,8 @@ pub struct SalvageReport {
     pub findings: Vec<String>,
     /// Tables with all rows, of which some have other values than those that were sealed.
     pub changed: Vec<String>,
+    /// Number of values that contradict others of which none is lost: the file was changed.
+    pub contradictions: u64,
     /// Lower-case hex SHA-256 of the damaged file.
     pub source_sha256: String,
 }
