@@ -169,8 +169,7 @@ pub fn chart(
     }
     chart.reference = builder.reference;
     builder.finish(&mut chart);
-    let first = series.points.first().map_or(0, |p| p.night);
-    let next = chart.nights.last().map_or(first, |n| n.night + 1);
+    let next = chart.nights.last().map_or(0, |n| n.night + 1);
     chart.unmeasured_nights = nights.len().saturating_sub(next);
     chart.state = chart.state(nights);
     chart
@@ -347,7 +346,8 @@ impl Chart {
         if self.open_excursion().is_some() {
             return SeriesState::Moved;
         }
-        if self.unmeasured_nights < UNMEASURED_NIGHTS {
+        // What never had a value, this bench may be unable to measure: a limit for it would have failed.
+        if self.unmeasured_nights < UNMEASURED_NIGHTS || self.nights.is_empty() {
             return match self.reference {
                 Some(_) => SeriesState::Steady,
                 None => SeriesState::Learning,

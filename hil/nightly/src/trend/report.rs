@@ -320,11 +320,7 @@ fn silent(charts: &[Chart], nights: &[NightSummary]) -> Option<String> {
         .map_or_else(String::new, |other| {
             format!(" in {}, now in {},", first.series.unit, other.series.unit)
         });
-    let since = match (first.nights.last(), first.series.points.first()) {
-        (Some(last), _) => format!("since {}", day(&nights[last.night])),
-        (None, Some(asked)) => format!("ever since {}", day(&nights[asked.night])),
-        (None, None) => return None,
-    };
+    let last = &nights[first.nights.last()?.night];
     let others = match silent.len() - 1 {
         0 => String::new(),
         n => format!(
@@ -333,8 +329,10 @@ fn silent(charts: &[Chart], nights: &[NightSummary]) -> Option<String> {
         ),
     };
     Some(format!(
-        "{}{unit} has had no usable value {since} ({} nights){others}",
-        first.series.name, first.unmeasured_nights
+        "{}{unit} has had no usable value since {} ({} nights){others}",
+        first.series.name,
+        day(last),
+        first.unmeasured_nights
     ))
 }
 
