@@ -5,16 +5,18 @@ use std::fmt::Write as _;
 use skinrig_nightly::trend::report::format_number as number;
 use skinrig_nightly::trend::{Chart, Report, SeriesState};
 use skinrig_text::{
-    Blocks, Column as Cells, LongWords, Paint, Style as Look, WIDTH, hang, sparkline, wrap,
+    Blocks, Column as Cells, LongWords, Paint, Style as Look, WIDTH, cut, hang, sparkline, wrap,
 };
 
 use super::{Links, cause, moved_by, since, state, with_unit};
 use crate::document::{Block, Column, Row, Table, lines};
 use crate::format::plain;
 
-/// Columns of the name of a series; ASCII has no mark for a cut.
+/// Columns of the name of a series, at least.
 const NAME: usize = 35;
-/// Nights in a sparkline.
+/// The longest name that is shown whole: no series of a suite has a longer one.
+const LONGEST_NAME: usize = 47;
+/// Nights in a sparkline beside short names.
 const SPARK: usize = 20;
 /// Columns and rows of a chart.
 const PLOT: (usize, usize) = (66, 9);
@@ -90,12 +92,14 @@ pub fn sentence(report: &Report) -> String {
 
 /// One row per series, under the identifiers that commands take.
 fn series(report: &Report, charts: &[&Chart], style: Style) -> Table {
-    let widths = charts.iter().map(|c| c.series.name.chars().count());
-    let name = widths.max().unwrap_or(0).max(NAME);
-    let nights = format!("last {} nights", SPARK.min(style.nights));
+    let widths = charts.iter().map(|c| plain(&c.series.name).chars().count());
+    let name = widths.max().unwrap_or(0).clamp(NAME, LONGEST_NAME);
+    // Commands take the name: it is shown whole, at the expense of the nights.
+    let recent = (SPARK + NAME - name).min(style.nights);
+    let nights = format!("{recent} nights");
     let columns = [
         Column::of_terminals("series", Cells::left(name)),
-        Column::of_terminals(nights, Cells::left(SPARK)),
+        Column::of_terminals(nights, Cells::left(recent)),
         Column::of_terminals("last", Cells::right(13)),
         Column::of_terminals("state", Cells::left(0).after(1)),
     ];
@@ -103,8 +107,8 @@ fn series(report: &Report, charts: &[&Chart], style: Style) -> Table {
         let last = chart.nights.last();
         let last = last.map(|n| with_unit(n.value, &chart.series.unit));
         let row = Row::new([
-            plain(&chart.series.name),
-            spark(report, chart, style),
+            cut(&plain(&chart.series.name), name).to_owned(),
+            spark(report, chart, recent, style),
             last.unwrap_or_else(|| "-".to_owned()),
             match chart.state {
                 SeriesState::NotMeasured => "no value".to_owned(),
@@ -118,8 +122,8 @@ fn series(report: &Report, charts: &[&Chart], style: Style) -> Table {
 }
 
 /// Sparkline: one block per night, the centre of the reference in the middle; a space for a night without a value.
-fn spark(report: &Report, chart: &Chart, style: Style) -> String {
-    let from = report.nights.len().saturating_sub(SPARK.min(style.nights));
+fn spark(report: &Report, chart: &Chart, recent: usize, style: Style) -> String {
+    let from = report.nights.len().saturating_sub(recent);
     let share = |night| {
         let at = chart
             .nights
