@@ -66,7 +66,10 @@ impl Bench for RealBench {
         }
         let mut firmware = Vec::new();
         if let Ok(robot) = &devices.robot {
-            firmware.push(("robot", robot.identity().firmware));
+            let identity = robot.identity();
+            // Versions are compared between nights; the file of the library, in parentheses behind its version, is none.
+            let versions = identity.firmware.split(" (").next().unwrap_or_default();
+            firmware.push(("robot", versions.to_owned()));
         }
         for camera in CameraId::ALL {
             if let Ok(device) = &devices.cameras[camera.index()] {

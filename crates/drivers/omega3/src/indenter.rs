@@ -35,7 +35,7 @@ impl Omega {
     pub fn open(config: OmegaConfig, clock: RealClock) -> Result<Self, OmegaError> {
         config.check()?;
         let loaded = load::load(config.library.as_deref())?;
-        let description = format!("SDK {}", loaded.version);
+        let description = loaded.to_string();
         let advice = loaded.advice.clone();
         let mut omega = Self::with_sdk(
             Arc::new(loaded.library),

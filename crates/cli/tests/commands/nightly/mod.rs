@@ -385,6 +385,13 @@ fn contradict_the_rig() {
         assert_eq!(output.status.code(), Some(exit), "{stderr}");
     };
     assert_told("robot_state", 3, "no trends for this night");
+    // The library of the emulated robot is in a folder of its own each time, which is no other firmware.
+    let night = nights.night("robot_state").night;
+    let firmware = night["versions"]["firmware"].to_string();
+    assert!(
+        firmware.contains("SDK 3.") && !firmware.contains('/'),
+        "{firmware}"
+    );
     nights.edit_rig("max_speed: 100 mm/s", "max_speed: 20 mm/s");
     let told = "checks.repeatability.speed: expected at most 20 mm/s, `limits.max_speed` of";
     assert_told("repeatability", 2, told);
