@@ -72,3 +72,49 @@ fn of(measure: &Measure, limits: &BenchLimits) -> Vec<Contradiction> {
     };
     found.into_iter().flatten().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use skinrig_protocol::rig::Workspace;
+
+    use super::*;
+
+    #[test]
+    fn only_values_beyond_their_limits_are_named() {
+        let limits = BenchLimits {
+            workspace: Workspace {
+                min_mm: [-50.0; 3],
+                max_mm: [50.0; 3],
+            },
+            max_speed_mm_s: 40.0,
+            max_force_n: 1.0,
+            max_lead_mm: 2.0,
+            max_depth_mm: 3.0,
+        };
+        let keys = |measure: &Measure| -> Vec<_> {
+            let found = of(measure, &limits).into_iter();
+            found.map(|c| (c.key, c.limit)).collect()
+        };
+        let speed = |speed_mm_s| Measure::Repeatability {
+            approaches: 2,
+            speed_mm_s,
+        };
+        let force = |force_n, depth_mm| Measure::ForceCeiling { force_n, depth_mm };
+        let depth = |depth_mm| Measure::Depth {
+            depth_mm,
+            presses: 1,
+        };
+        for within in [
+            speed(40.0),
+            force(1.0, 3.0),
+            depth(3.0),
+            Measure::RobotState,
+        ] {
+            assert_eq!(keys(&within), [], "{within:?}");
+        }
+        assert_eq!(keys(&speed(40.1)), [("speed", "max_speed")]);
+        assert_eq!(keys(&depth(3.1)), [("depth", "max_depth")]);
+        let both = [("force", "max_force"), ("depth", "max_depth")];
+        assert_eq!(keys(&force(1.1, 3.1)), both);
+    }
+}

@@ -153,6 +153,10 @@ pub(super) fn headline(night: &Night) -> String {
     let marginal = count(night, Verdict::Marginal);
     match (looked_at.as_slice(), night.verdict, marginal) {
         ([], Verdict::Skipped, _) => "Nothing was checked".to_owned(),
+        ([], verdict, _) if !verdict.is_good() => match night.ended_early {
+            Some(_) => "The night ended early".to_owned(),
+            None => "Nothing was checked".to_owned(),
+        },
         ([], _, 0) => "All within limits".to_owned(),
         ([], _, 1) => "All within limits, one marginal".to_owned(),
         ([], _, n) => format!("All within limits, {n} marginal"),

@@ -47,7 +47,7 @@ pub fn tree(night: &Night, paint: Paint) -> String {
     if let Some(why) = &night.ended_early {
         out.wrapped(0, &format!("ended early: {why}"));
     }
-    if !night.finished {
+    if !night.finished && night.ended_early.is_none() {
         out.wrapped(0, "unfinished: still running, or its process died");
     }
     if let Some(note) = &night.lease_note {

@@ -412,3 +412,22 @@ proptest! {
         }
     }
 }
+
+/// Whoever reads of a night whose files are lost must not take it for a good one.
+#[test]
+fn a_night_whose_files_are_lost_is_not_good() {
+    for (measured, expected) in [
+        (Verdict::Pass, Verdict::Fail),
+        (Verdict::Invalid, Verdict::Invalid),
+    ] {
+        let mut lost = night(vec![check("disk", measured, None)]);
+        lost.verdict = measured;
+        lost.lose("no space left");
+        assert_eq!((lost.verdict, lost.finished), (expected, false));
+        assert_eq!(lost.exit, NightExit::Infrastructure);
+        assert!(
+            lost.ended_early
+                .is_some_and(|why| why.contains("no space left"))
+        );
+    }
+}
