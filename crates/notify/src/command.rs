@@ -1,9 +1,11 @@
 //! The channel `command`: a program with the JSON on its standard input.
 
 use std::io::Write as _;
+use std::os::unix::process::CommandExt as _;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Signal, kill_process_group};
 use skinrig_model::{NotificationChannel, NotificationFault};
 
 use crate::attempt::Channel;
@@ -39,8 +41,7 @@ impl Command {
                 }
                 Ok(None) if Instant::now() < until => std::thread::sleep(POLL_INTERVAL),
                 Ok(None) => {
-                    let _ = child.kill();
-                    let _ = child.wait();
+                    end(child);
                     let limit_s = self.timeout.as_secs();
                     return Err(NotificationFault::Slow { program, limit_s });
                 }
@@ -51,6 +52,13 @@ impl Command {
             }
         }
     }
+}
+
+/// Ends the program, and the programs that it has started.
+fn end(child: &mut Child) {
+    // One that has ended meanwhile has no group left to end.
+    let _ = kill_process_group(Pid::from_child(child), Signal::KILL);
+    let _ = child.wait();
 }
 
 impl Channel for Command {
@@ -64,6 +72,7 @@ impl Channel for Command {
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
+            .process_group(0)
             .spawn()
             .map_err(|e| NotificationFault::NotStarted {
                 program: self.program(),

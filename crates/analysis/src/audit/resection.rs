@@ -6,7 +6,7 @@
 //! displacement.
 
 use nalgebra::{SMatrix, SVector};
-use skinrig_model::{CameraModel, Point2};
+use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH};
 
 use super::statistics::median;
 
@@ -23,10 +23,12 @@ pub(super) const MIN_SPREAD_DEG: f64 = 0.5;
 pub(super) const MEDIAN_TO_SIGMA: f64 = 1.4826;
 /// Residuals of this many standard deviations have half weight.
 const SOFT: f64 = 2.5;
-/// Iterations of the fit.
+/// Iterations of the fit, at most.
 const ROUNDS: usize = 12;
-/// Step sizes of the numerical derivatives.
-const STEP: [f64; PARAMETERS] = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4];
+/// A step of this many prior standard deviations ends the fit.
+const CONVERGED: f64 = 1e-6;
+/// Least square of a distance from the camera, mm²: directions of positions at the camera turn without limit.
+const NEAREST_MM2: f64 = 1e-6;
 
 type Vector = SVector<f64, PARAMETERS>;
 
@@ -67,6 +69,9 @@ pub(crate) fn resect(
         let Some(step) = step(drawn, &off, pairs, &residuals, spread, weight) else {
             break;
         };
+        if (0..PARAMETERS).all(|k| step[k].abs() < CONVERGED * PRIOR[k]) {
+            break;
+        }
         off += step;
         // A lens that folds, or a camera at the other end of the room, is not a fit.
         for k in 0..PARAMETERS {
@@ -99,6 +104,9 @@ pub(crate) fn residual_deg(camera: &CameraModel, column: f64, at: Point2) -> f64
 
 /// The same angle within ±180, degrees.
 pub(super) fn wrapped_deg(angle: f64) -> f64 {
+    if angle.abs() < 180.0 {
+        return angle;
+    }
     angle - 360.0 * (angle / 360.0).round()
 }
 
@@ -127,20 +135,11 @@ fn step(
     spread: f64,
     weight: f64,
 ) -> Option<Vector> {
-    let ahead: Vec<CameraModel> = (0..PARAMETERS)
-        .map(|k| {
-            let mut there = *off;
-            there[k] += STEP[k];
-            moved(drawn, &there)
-        })
-        .collect();
+    let camera = moved(drawn, off);
     let mut normal = SMatrix::<f64, PARAMETERS, PARAMETERS>::zeros();
     let mut right = Vector::zeros();
-    for (pair, r) in pairs.iter().zip(residuals) {
-        let mut by = Vector::zeros();
-        for k in 0..PARAMETERS {
-            by[k] = (residual_deg(&ahead[k], pair.0, pair.1) - r) / STEP[k];
-        }
+    for (&(column, at), r) in pairs.iter().zip(residuals) {
+        let by = slope(drawn, &camera, column, at);
         let soft = weight / (1.0 + (r / (SOFT * spread)).powi(2)) / (spread * spread);
         normal += by * by.transpose() * soft;
         right -= by * (soft * r);
@@ -152,4 +151,74 @@ fn step(
     }
     let step = normal.cholesky()?.solve(&right);
     step.iter().all(|v| v.is_finite()).then_some(step)
+}
+
+/// Derivatives of [`residual_deg`] by the parameters.
+fn slope(drawn: &CameraModel, camera: &CameraModel, column: f64, at: Point2) -> Vector {
+    // By the camera's position, the direction of a point turns by this, degrees per mm.
+    let turn = |to: Point2| {
+        let (x, y) = (
+            to.x_mm - camera.position.x_mm,
+            to.y_mm - camera.position.y_mm,
+        );
+        let square = (x * x + y * y).max(NEAREST_MM2);
+        [(y / square).to_degrees(), (-x / square).to_degrees()]
+    };
+    let (of_point, of_axis) = (turn(at), turn(camera.aim));
+    let half = f64::from(SENSOR_WIDTH) / 2.0;
+    let angle = camera.lens.angle((column - half) / half);
+    Vector::new(
+        of_point[0] - of_axis[0],
+        of_point[1] - of_axis[1],
+        1.0,
+        angle.by_w,
+        angle.by_half_fov * drawn.lens.coefficients().0,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinrig_model::StereoGeometry;
+
+    #[test]
+    fn derivatives_are_the_slopes_of_the_residual() {
+        let drawn = StereoGeometry::PAPER.cameras[0];
+        let off = Vector::new(1.5, -2.0, 3.0, 0.05, -0.02);
+        let at_off = |off: &Vector, column, at| residual_deg(&moved(&drawn, off), column, at);
+        for (column, at) in [
+            (40.0, Point2::new(-30.0, 20.0)),
+            (333.0, Point2::new(10.0, 2.0)),
+            (610.0, Point2::new(20.0, -20.0)),
+        ] {
+            let by = slope(&drawn, &moved(&drawn, &off), column, at);
+            for k in 0..PARAMETERS {
+                let step = 1e-5 * PRIOR[k];
+                let (mut ahead, mut behind) = (off, off);
+                ahead[k] += step;
+                behind[k] -= step;
+                let slope =
+                    (at_off(&ahead, column, at) - at_off(&behind, column, at)) / (2.0 * step);
+                assert!(
+                    (slope - by[k]).abs() < 1e-4 * (1.0 + slope.abs()),
+                    "{k}: {slope} {}",
+                    by[k]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_position_at_the_camera_leaves_a_fit() {
+        let drawn = StereoGeometry::PAPER.cameras[0];
+        let mut pairs: Vec<(f64, Point2)> = (0..9)
+            .map(|k| Point2::new(f64::from(k % 3) * 10.0, f64::from(k / 3) * 10.0))
+            .filter_map(|at| Some((drawn.column_of_point(at)?, at)))
+            .collect();
+        assert_eq!(pairs.len(), 9);
+        pairs.push((320.0, drawn.position));
+        let fit = resect(&drawn, &pairs, pairs.len()).unwrap();
+        assert!(fit.off.iter().all(|v| v.is_finite()));
+        assert!(fit.spread_deg <= MIN_SPREAD_DEG, "{fit:?}");
+    }
 }

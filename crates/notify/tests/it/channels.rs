@@ -94,6 +94,25 @@ fn a_command_gets_the_json_and_its_exit_code_counts() {
         matches!(failed, Fault::Slow { limit_s: 1, .. }),
         "{failed:?}"
     );
+    // What a slow program has started ends with it.
+    let script = "sleep 600 & echo $! > \"$1\"; wait";
+    let (_, failed) = fault(&settings(&format!(
+        "  command: {{run: [sh, -c, '{script}', sh, {}]}}\n  timeout: 1 s\n  tries: 1\n",
+        file.display()
+    )));
+    assert!(
+        matches!(failed, Fault::Slow { limit_s: 1, .. }),
+        "{failed:?}"
+    );
+    let started = std::fs::read_to_string(&file).unwrap();
+    let stat = format!("/proc/{}/stat", started.trim());
+    // Gone, or a zombie whose new parent has not looked after it yet; killed, it is so once it gets the processor.
+    let is_over = || std::fs::read_to_string(&stat).map_or(true, |line| line.contains(") Z "));
+    let until = std::time::Instant::now() + std::time::Duration::from_secs(60);
+    while !is_over() {
+        assert!(std::time::Instant::now() < until, "still runs");
+        std::thread::yield_now();
+    }
 }
 
 #[test]
