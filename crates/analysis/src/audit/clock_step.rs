@@ -11,6 +11,7 @@ use skinrig_model::{CameraId, PressId};
 use super::finding::finding;
 use super::observed_press::ObservedPress;
 use super::slow::burst_delay_s;
+use super::statistics::median;
 use crate::result::{ClockFit, Evidence, Fault, Finding, Law};
 
 /// A burst this close to a press belongs to it, s.
@@ -55,12 +56,8 @@ pub(super) fn findings(
     let steps = CameraId::ALL.map(|camera| {
         let drift = clocks[camera.index()]?.drift_ppm * 1e-6;
         let contacts = contacts_s[camera.index()];
-        // A line through both sides of a step drifts.
-        let begin = *times.first()?;
-        let even: Vec<f64> = contacts.iter().map(|c| c + drift * (c - begin)).collect();
-        let found = step(&times, contacts, least_s)
-            .into_iter()
-            .chain(step(&times, &even, least_s));
+        let found = step(&times, contacts, least_s).into_iter();
+        let found = found.chain(step_for_drift(&times, contacts, drift, least_s));
         found.max_by_key(|s| s.explained)
     });
     let say = |camera: CameraId, both: bool, found: Step| {
@@ -176,6 +173,37 @@ fn step(listed: &[f64], contacts: &[f64], least_s: f64) -> Option<Step> {
     (is_gain(found.explained, found.one_offset) && is_gain(bursts, bursts_of_one)).then_some(found)
 }
 
+/// Usual distance, s, of the presses from the bursts next to them, at the offset of their part: about the median of the part, as bursts
+/// come later than presses.
+fn distance_s(contacts: &[f64], parts: &[(&[f64], f64)]) -> f64 {
+    let nearest = |at: f64| {
+        let next = contacts.partition_point(|t| *t < at);
+        let around = [next.checked_sub(1), Some(next)].into_iter().flatten();
+        let apart = around.filter_map(|i| Some(contacts.get(i)? - at));
+        apart.min_by(|a, b| a.abs().total_cmp(&b.abs()))
+    };
+    let of_part = |(presses, offset_s): &(&[f64], f64)| {
+        let apart = presses.iter().filter_map(|at| nearest(at + offset_s));
+        let apart: Vec<f64> = apart.collect();
+        let middle = median(apart.clone()).unwrap_or(0.0);
+        let from_middle = apart.into_iter().map(|s| (s - middle).abs());
+        from_middle.collect::<Vec<f64>>()
+    };
+    median(parts.iter().flat_map(of_part).collect()).unwrap_or(f64::INFINITY)
+}
+
+/// The step that the fitted drift stands for, if any: a line through both sides of a step drifts. Then the presses are closer to
+/// their bursts with the step instead of the line. Of a clock that does drift it is the other way round, however long the session.
+fn step_for_drift(listed: &[f64], contacts: &[f64], drift: f64, least_s: f64) -> Option<Step> {
+    let begin = *listed.first()?;
+    let even: Vec<f64> = contacts.iter().map(|c| c + drift * (c - begin)).collect();
+    let found = step(listed, &even, least_s)?;
+    let (before, after) = listed.split_at(found.from);
+    let after_s = found.before_s + found.step_s;
+    let stepped = distance_s(&even, &[(before, found.before_s), (after, after_s)]);
+    (stepped < distance_s(contacts, &[(listed, 0.0)])).then_some(found)
+}
+
 /// Number of bursts near a press of any part, at its offset.
 fn with_a_press(contacts: &[f64], parts: &[(&[f64], f64)]) -> usize {
     let has_press = |c: &&f64| {
@@ -246,6 +274,41 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_clock_that_drifts_for_hours_does_not_step() {
+        let at = |i: i32, period_s: f64| period_s * f64::from(i);
+        for (period_s, pause_s) in [(400.0, 0.0), (3.0, 35_000.0), (60.0, 7_000.0)] {
+            for ppm in [-90.0, -40.0, 25.0, 40.0, 90.0] {
+                let pause = |i: i32| if i < 50 { 0.0 } else { pause_s };
+                let listed: Vec<f64> = (0..100).map(|i| at(i, period_s) + pause(i)).collect();
+                // On the fitted clock bursts come up to 40 ms late.
+                let late = (0..100).map(|i| 0.01 * f64::from(i * i % 5));
+                let contacts: Vec<f64> = listed.iter().zip(late).map(|(t, by)| t + by).collect();
+                let found = step_for_drift(&listed, &contacts, ppm * 1e-6, MIN_STEP_S);
+                assert_eq!(found, None, "{period_s} s, pause {pause_s} s, {ppm} ppm");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_through_both_sides_of_a_step_is_no_drift() {
+        for by_s in [-0.9, -0.45, 0.45, 0.9] {
+            let listed = path(100);
+            let length_s = listed[99] - listed[0];
+            // The least-squares line through a step in the middle.
+            let drift = 1.5 * by_s / length_s;
+            let fitted = |t: &f64| t - drift * (t - listed[0] - 0.5 * length_s) - 0.5 * by_s;
+            let mut contacts: Vec<f64> = stepped(&listed, 50, by_s).iter().map(fitted).collect();
+            contacts.sort_by(f64::total_cmp);
+            let found = step_for_drift(&listed, &contacts, drift, MIN_STEP_S);
+            let found = found.unwrap_or_else(|| panic!("{by_s}"));
+            assert!(
+                (found.step_s - by_s).abs() < 0.06 && found.from.abs_diff(50) <= 1,
+                "{found:?}"
+            );
         }
     }
 

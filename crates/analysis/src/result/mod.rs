@@ -90,8 +90,8 @@ use crate::rule::Rule;
 /// except their summary. Version 29: positions in another scale are also found about their middle, and unused settings are named. Version 30:
 /// so are lists of presses in any other order. Version 31: touches felt while recording have depths. Version 32: parts of the picture without
 /// events are named. Version 33: so are cameras that change, and faults of the readout; slow tips and bent skins are no faults. Version 34: results are
-/// the same on every processor.
-pub const ANALYSIS_VERSION: u32 = 34;
+/// the same on every processor. Version 35: a clock that drifts for hours does not step.
+pub const ANALYSIS_VERSION: u32 = 35;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -321,7 +321,7 @@ pub struct Metrics {
     pub rmse_diagonal_percent: Option<f64>,
 }
 
-/// Smallest share of the attempted scored presses whose error may rank a skin, meet a limit or end a campaign: the error of fewer
+/// Smallest share of the scored presses whose error may rank a skin, meet a limit or end a campaign: the error of fewer
 /// is that of the easy ones.
 pub const LEAST_LOCATED: f64 = 0.5;
 
