@@ -35,7 +35,8 @@ struct Point {
     overrides: Vec<String>,
 }
 
-/// Comparable sessions: one prototype, one protocol, one kind of rig, one set of changes of a variant.
+/// Comparable sessions: one prototype, one protocol, one kind of rig, one set of changes of a variant. Of simulated rigs the kind is
+/// the name, which says level and faults on purpose.
 #[derive(Debug, Serialize)]
 struct Series {
     protocol: String,
@@ -159,6 +160,7 @@ fn read(shelf: &Shelf, analysis: Option<&str>) -> Vec<Entry> {
             prototype,
             protocol_name,
             rig_kind,
+            rig_name,
             annotations,
             sealed,
             ..
@@ -178,7 +180,10 @@ fn read(shelf: &Shelf, analysis: Option<&str>) -> Vec<Entry> {
         Some(Entry {
             prototype: prototype.clone(),
             protocol: protocol_name.clone(),
-            rig_kind: rig_kind.clone(),
+            rig_kind: match rig_kind.as_str() {
+                "simulated" => rig_name.clone(),
+                kind => kind.to_owned(),
+            },
             point: Point {
                 session: session.path.clone(),
                 started_at: started_at.clone(),
@@ -235,7 +240,7 @@ fn print(all: &[Prototype], each: bool) {
     let table = Table::new([
         Column::left(18).clipped(),
         Column::left(22).clipped(),
-        Column::left(9).clipped(),
+        Column::left(20).clipped(),
         Column::right(8),
         Column::left(16),
         Column::left(27),

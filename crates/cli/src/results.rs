@@ -296,9 +296,16 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
         return Ok(Exit::Ok);
     };
     let metrics = &analysis.scored;
-    if let Some(share) = metrics.located_rate.value.filter(|s| *s < LEAST_LOCATED) {
+    if let Some(share) = analysis
+        .located_of_scored()
+        .filter(|share| *share < LEAST_LOCATED)
+    {
+        let owed = match analysis.scored_owed() {
+            0 => String::new(),
+            owed => format!(", as {owed} were never made"),
+        };
         return Err(Failure::limit(format!(
-            "scored RMSE: expected that of at least half of the attempted scored presses (--max-rmse), found {:.1} %\n  next: the \
+            "scored RMSE: expected that of at least half of the scored presses (--max-rmse), found {:.1} %{owed}\n  next: the \
              report says why each press does not count",
             100.0 * share
         )));

@@ -357,9 +357,13 @@ pub(crate) fn tradeoff(args: &TradeoffArgs, output: Output) -> Outcome {
         |a: &Recommendation<'_>| Some((a.question.clone(), refusal(a.found.as_ref().err()?)));
     match recommendations.iter().find_map(unmet) {
         None => Ok(Exit::Ok),
-        Some((question, why)) => Err(Failure::limit(format!(
-            "expected a choice that is {question}, found {why}; {} tried\n  next: relax the requirement, press more locations, or try --full",
-            result.rows.len()
-        ))),
+        Some((question, why)) => {
+            let (tried, of) = (result.rows.len(), result.predictions.combinations);
+            let full = if tried < of { ", or try --full" } else { "" };
+            Err(Failure::limit(format!(
+                "expected a choice that is {question}, found {why}; {tried} tried\n  next: relax the requirement, use more presses \
+                 (`analysis.study_presses`), press more locations{full}"
+            )))
+        }
     }
 }

@@ -11,7 +11,7 @@ use crate::metrics::Metric;
 use crate::no_result::NoResult;
 use crate::sequential::{SequentialComparison, first_repetitions, look};
 use crate::subject::{SessionFacts, Subject};
-use crate::table::{Margins, Row, table};
+use crate::table::{BaselineComparison, Margins, Row, table};
 use skinrig_statistics::{AlphaSpending, Pairing, Settings, Verdict};
 
 /// Options of a comparison.
@@ -105,6 +105,16 @@ impl Comparison {
         } else {
             None
         }
+    }
+
+    /// True if the interval of the difference in RMSE of skin `subject` and the first does not hold 0.
+    fn is_rmse_different(&self, subject: usize) -> bool {
+        let all = self.headline().map(|row| &row.against_first);
+        let of = all.and_then(|all| all.iter().find(|a| a.subject == subject));
+        let difference = of.and_then(BaselineComparison::difference);
+        difference.is_some_and(|d| {
+            d.high.is_some_and(|high| high < 0.0) || d.low.is_some_and(|low| low > 0.0)
+        })
     }
 
     /// Verdict on the RMSE of skin `subject` against the first.
@@ -221,7 +231,12 @@ pub fn compare(
             });
             let reanalysis = reanalysis.as_ref();
             let reanalysis = reanalysis.map(|[first, second]| Reanalysis { first, second });
-            causes(&subjects[0], other, reanalysis, RESAMPLES, settings.seed)
+            let mut found = causes(&subjects[0], other, reanalysis, RESAMPLES, settings.seed)?;
+            // What may be no change has no cause. The interval of the RMSE is the wider one.
+            if !result.is_rmse_different(i + 1) {
+                found.carried_by = None;
+            }
+            Some(found)
         })
         .collect();
     result

@@ -7,6 +7,9 @@ use skinrig_settings::{Collector, Field, Settings, ValueRange};
 /// A moment relative to the press time, s; may be before it.
 const MOMENT_S: ValueRange = ValueRange::between(-3600.0, 3600.0);
 
+/// Least time at depth and of the way up: what tells these moments apart needs it.
+const LEAST: HostDuration = HostDuration::from_millis(10);
+
 /// The moments of a press relative to its press time, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Settings)]
 #[settings(name = "phases", parts = PhaseParts)]
@@ -29,6 +32,10 @@ pub struct PressPhases {
     /// The tip is back at clearance height.
     #[setting(range = MOMENT_S, example = "425 ms")]
     pub clear: HostDuration,
+}
+
+fn ms(moment: HostDuration) -> f64 {
+    moment.0 as f64 / 1e6
 }
 
 impl PressPhases {
@@ -87,6 +94,24 @@ impl PressPhases {
                 )
                 .expected(format!("after `{earlier}`, {} s", a.as_secs_f64()))
                 .found(format!("{} s", b.as_secs_f64()));
+            } else if let [
+                (earlier @ ("at_depth" | "retract"), Some(a)),
+                (later, Some(b)),
+            ] = pair
+                && b.0 - a.0 < LEAST.0
+            {
+                let at = field.at(later);
+                out.error(
+                    at.span,
+                    at.path.as_str(),
+                    "the moments of a press are too close together",
+                )
+                .expected(format!(
+                    "at least {} ms, {} ms after `{earlier}`",
+                    ms(*a + LEAST),
+                    ms(LEAST)
+                ))
+                .found(format!("{} ms", ms(*b)));
             }
         }
     }

@@ -92,7 +92,9 @@ pub enum RatesError {
     )]
     Flat,
     /// The refinement found too few presses for a line.
-    #[error("expected at least 3 presses to be visible in the event rates, found {found}")]
+    #[error(
+        "expected at least 3 presses, at different times, to be visible in the event rates and to agree on the clock, found {found}"
+    )]
     FewVisible {
         /// Presses found.
         found: usize,

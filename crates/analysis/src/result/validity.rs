@@ -1,5 +1,7 @@
 //! Decides whether the numbers of an analysis may be used.
 
+use skinrig_model::{PressRole, Verdict};
+
 use super::{Analysis, Warning, WarningCause};
 
 impl Analysis {
@@ -14,6 +16,26 @@ impl Analysis {
     #[must_use]
     pub fn may_calibrate(&self) -> bool {
         self.alignment.is_usable() && !self.findings.iter().any(|f| f.invalidates)
+    }
+
+    /// Number of scored presses that the plan still owes: those never made. A campaign that ended because its question was decided owes
+    /// none.
+    #[must_use]
+    pub fn scored_owed(&self) -> usize {
+        if self.campaign.as_ref().is_some_and(|c| c.decided.is_some()) {
+            return 0;
+        }
+        let scored = self.presses.iter().filter(|p| p.role == PressRole::Score);
+        scored.filter(|p| p.verdict == Verdict::Missed).count()
+    }
+
+    /// Share of the scored presses with a counting estimate, of those attempted and those owed; `None` without any.
+    #[must_use]
+    pub fn located_of_scored(&self) -> Option<f64> {
+        let attempted = self.scored.located_rate;
+        let (share, n) = (attempted.value.unwrap_or(0.0), attempted.n as f64);
+        let all = n + self.scored_owed() as f64;
+        (all > 0.0).then(|| share * n / all)
     }
 
     /// The warning that no press gives a number.

@@ -211,8 +211,9 @@ pub enum AlignmentViolation {
     #[error(
         "alignment by event rates: expected log-odds of at least {least_log_odds} (natural logarithm) against all other \
          alignments, found {log_odds:.1}: {}; check the schedule (presses, sync presses, period) against the \
-         recordings, or lower analysis.alignment.min_log_odds",
-        rival(.runner_up_s.as_ref(), *.period_s)
+         recordings{}",
+        rival(.runner_up_s.as_ref(), *.period_s),
+        if *.log_odds > 0.0 { ", or lower analysis.alignment.min_log_odds" } else { "" }
     )]
     UncertainRates {
         /// Minimum.

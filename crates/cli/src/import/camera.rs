@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use skinrig_device::{CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera};
-use skinrig_formats::{FormatsError, Scanner, evt2};
+use skinrig_formats::{FormatsError, Geometry, Scanner, evt2};
 use skinrig_model::{
     CameraId, CdEvent, ChunkFacts, DeviceIdentity, DeviceRole, RawChunk, Setting, StreamFormat,
     TriggerEdge,
@@ -66,6 +66,20 @@ pub(crate) enum RecordingError {
         strange: u64,
         /// Words that were tested, without those of the time base.
         words: u64,
+    },
+    /// The header names a sensor of another size.
+    #[error(
+        "{}: expected a recording of {} x {} pixels, found {width} x {height} in its header: its columns would be read as other angles\n  \
+         next: import a recording of an EVK1 at full resolution; if the header is of another recording, correct its line `% geometry`",
+        path.display(), Geometry::EVK1.width, Geometry::EVK1.height
+    )]
+    OtherSensor {
+        /// The file.
+        path: PathBuf,
+        /// Columns.
+        width: u16,
+        /// Rows.
+        height: u16,
     },
     /// The stream ends within a word.
     #[error(

@@ -322,6 +322,7 @@ fn open(
             }
             let reader = RawReader::open(&path).map_err(Failure::input)?;
             let format = reader.header().format;
+            check_sensor(&path, &reader).map_err(Failure::input)?;
             check_words(&path, &reader).map_err(Failure::input)?;
             check_format(&path).map_err(Failure::input)?;
             about["header"] = serde_json::json!(reader.header().entries);
@@ -355,6 +356,18 @@ fn read_hdf5(
         if batch.is_empty() || feed.events(batch).is_err() {
             return Ok(());
         }
+    }
+}
+
+/// Rejects the recording of a sensor of another size.
+fn check_sensor(path: &Path, reader: &RawReader) -> Result<(), RecordingError> {
+    match reader.header().geometry {
+        Some(found) if found != Geometry::EVK1 => Err(RecordingError::OtherSensor {
+            path: path.into(),
+            width: found.width,
+            height: found.height,
+        }),
+        _ => Ok(()),
     }
 }
 

@@ -295,6 +295,23 @@ fn raw_files_of_another_format_than_their_header_says() {
 }
 
 #[test]
+fn raw_files_of_a_sensor_of_another_size() {
+    let lab = Lab::new();
+    let mut data = Dataset::new(&lab);
+    let mut arguments = data.arguments(&lab.path("t"));
+    arguments.push("--no-analysis".into());
+    skinrig(&arguments).code(0);
+    let session = text(&only(&lab.path("t"), ".session.sqlite"));
+    skinrig(&["export", &session, "--to", "raw", "--out", &lab.text("e")]).code(0);
+    let raw = only(&lab.path("e"), ".camera2.raw");
+    patch(&raw, b"height=480;width=640", b"height=240;width=320");
+    patch(&raw, b"% geometry 640x480", b"% geometry 320x240");
+    data.cameras[1] = raw;
+    let found = "expected a recording of 640 x 480 pixels, found 320 x 240 in its header";
+    assert_refused(&lab, &data, 2, &[".camera2.raw", found, "next:"]);
+}
+
+#[test]
 fn raw_files_that_are_cut_off_or_empty() {
     let lab = Lab::new();
     let mut data = Dataset::new(&lab);

@@ -267,9 +267,21 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
     let lost = ["run", SMALL, "--sessions", &few, "--set", rule];
     skinrig(&[&lost[..], &["--max-rmse", "100"]].concat())
         .code(4)
-        .expect_stderr(&["at least half of the attempted scored presses", "next:"]);
+        .expect_stderr(&["at least half of the scored presses", "next:"]);
     let few = text(&only(&lab.path("few"), ".session.sqlite"));
     skinrig(&["compare", &few, &session, "--out", &lab.text("c.html")])
+        .code(2)
+        .expect_stderr(&["scored presses that count"]);
+    // Nor does that of the few presses that a run made before it failed.
+    let broken = lab.text("broken");
+    let lost = ["run", SMALL, "--sessions", &broken, "--fault"];
+    skinrig(&[&lost[..], &["robot-lost@hold:5"]].concat());
+    let broken = text(&only(&lab.path("broken"), ".session.sqlite"));
+    skinrig(&["analyze", &broken]).code(0);
+    skinrig(&["analyze", &broken, "--max-rmse", "100"])
+        .code(4)
+        .expect_stderr(&["at least half of the scored presses", "were never made"]);
+    skinrig(&["compare", &broken, &session, "--out", &lab.text("c.html")])
         .code(2)
         .expect_stderr(&["scored presses that count"]);
     // Without an analysis no limit is met.

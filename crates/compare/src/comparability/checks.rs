@@ -82,6 +82,12 @@ fn is_few(located: usize, attempted: usize) -> bool {
     (located as f64) < LEAST_LOCATED * attempted as f64
 }
 
+/// Scored presses that the plans of a subject still owe.
+fn owed(subject: &Subject) -> usize {
+    let sessions = subject.sessions.iter();
+    sessions.map(|s| s.analysis.scored_owed()).sum()
+}
+
 fn check_results(subjects: &[Subject], locations: &Locations) -> Option<Difference> {
     let counted = |s: &Subject| {
         locations
@@ -96,7 +102,7 @@ fn check_results(subjects: &[Subject], locations: &Locations) -> Option<Differen
     }
     let attempted: Vec<usize> = subjects
         .iter()
-        .map(|s| locations.attempts(s).count())
+        .map(|s| locations.attempts(s).count() + owed(s))
         .collect();
     let (key, reason) = if counts.contains(&0) {
         (
@@ -106,7 +112,7 @@ fn check_results(subjects: &[Subject], locations: &Locations) -> Option<Differen
     } else if counts.iter().zip(&attempted).any(|(n, of)| is_few(*n, *of)) {
         (
             "few-located",
-            "fewer than half of the attempted presses of a skin count, those that are easy to locate: their error is not that of the skin",
+            "fewer than half of the scored presses of a skin count, those that were made and are easy to locate: their error is not that of the skin",
         )
     } else {
         return None;

@@ -100,3 +100,36 @@ fn overlapping_presses_are_refused() {
         assert_eq!(error.list()[0].message, "the presses overlap");
     }
 }
+
+#[test]
+fn a_schedule_has_time_at_depth_and_on_the_way_up() {
+    let shipped = shipped("paper-recording.schedule.yaml");
+    let read = |from: &str, to: &str| {
+        let text = shipped.replace(from, to);
+        assert_ne!(text, shipped);
+        Schedule::parse("s.yaml", text.as_bytes(), &[])
+    };
+    for (from, to, expected) in [
+        (
+            "retract: 50 ms",
+            "retract: -91 ms",
+            "at least -90 ms, 10 ms after `at_depth`",
+        ),
+        (
+            "release: 275 ms",
+            "release: 59 ms",
+            "at least 60 ms, 10 ms after `retract`",
+        ),
+    ] {
+        let error = read(from, to).unwrap_err();
+        assert_eq!(error.list().len(), 1, "{error}");
+        assert!(error.to_string().contains("too close together"), "{error}");
+        assert!(
+            error.render(false).contains(expected),
+            "{}",
+            error.render(false)
+        );
+    }
+    assert!(read("retract: 50 ms", "retract: -90 ms").is_ok());
+    assert!(read("release: 275 ms", "release: 60 ms").is_ok());
+}
