@@ -204,6 +204,27 @@ pub(super) fn grids(about: Choice) -> Vec<Choice> {
     SIDES_PX.into_iter().flat_map(grid).collect()
 }
 
+/// True if the choices differ in one option by one step: half or twice the thinning or the bin, the next window, the next part
+/// of the rows, or another estimator.
+pub(super) fn are_neighbours(a: Choice, b: Choice) -> bool {
+    let rung = |c: Choice| windows().position(|w| w == c.window_ms);
+    let windows = match (rung(a), rung(b)) {
+        (Some(a), Some(b)) => a.abs_diff(b),
+        // A session may have a window of its own: it has no neighbours.
+        _ => 2 * usize::from(a.window_ms != b.window_ms),
+    };
+    let halvings = |a: u32, b: u32| match (a.min(b), a.max(b)) {
+        (a, b) if a == b => 0,
+        (a, b) if b % 2 == 0 && b / 2 == a => 1,
+        _ => 2,
+    };
+    let estimators = usize::from((a.estimator, a.centroid) != (b.estimator, b.centroid));
+    let thinnings = halvings(a.thinning, b.thinning);
+    let bins = halvings(a.bin_px.into(), b.bin_px.into());
+    let regions = (a.region as usize).abs_diff(b.region as usize);
+    estimators + thinnings + bins + windows + regions == 1
+}
+
 fn windows() -> impl Iterator<Item = Option<f64>> {
     WINDOWS_MS.iter().map(|w| Some(*w)).chain([None])
 }

@@ -132,19 +132,24 @@ impl Measuring<'_> {
         });
         let curves = self.points.clone();
         let rule = Rule::new(base, &curves);
-        let pool = search::pool(&all, &rule);
+        let mut pools = search::pools(&all, &rule);
         let seed = self.session.seed;
-        let mut order = search::shuffled(&pool, &curves, seed).into_iter();
+        let mut order = search::shuffled(&pools[0], &curves, seed).into_iter();
         search::draw(&mut order, search::DRAWS, |choice| self.add(choice));
         let draw_rows = self.points.len() - curves.len();
         search::draw(&mut order, self.plan.checks, |choice| self.add(choice));
         let check_rows = self.points.len() - curves.len() - draw_rows;
+        for point in self.points.iter().filter(|p| p.rmse_mm.is_some()) {
+            search::admit(&mut pools, point.choice);
+        }
         for turn in 0..search::PROMISING {
-            let picked = search::promising(&pool, &self.points, &rule, turn);
+            let picked = search::promising(&pools[0], &self.points, &rule, turn);
             let Some(choice) = picked.filter(|_| !self.is_stopped) else {
                 break;
             };
-            self.add(choice);
+            if self.add(choice) {
+                search::admit(&mut pools, choice);
+            }
         }
         let best = self.best.map(|best| self.points[best].choice);
         for about in [Some(base), best].into_iter().flatten() {

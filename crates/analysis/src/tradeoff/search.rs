@@ -13,8 +13,8 @@ use super::rule::{Point, Rule, class};
 pub(super) const DRAWS: usize = 59;
 /// Draws that do not compete are not counted; at most so many in all.
 const MOST_DRAWS: usize = 2 * DRAWS;
-/// Combinations measured because they promise a better front.
-pub(super) const PROMISING: usize = 40;
+/// Combinations measured because they promise a better front, at most.
+pub(super) const PROMISING: usize = 160;
 /// Stream of the seed that draws.
 const STREAM: u64 = 0x6472_6177;
 /// Halvings of both columns and rows that would leave no bits of an event.
@@ -24,12 +24,20 @@ const PRIOR: f64 = 0.5;
 /// Distances at which a neighbour counts 60 %: log2 of thinning and bin, log of the window, steps of rows.
 const REACH: [f64; 4] = [3.0, 3.0, 1.2, 1.5];
 
-/// All choices whose errors the curves predict and that should locate enough presses.
-pub(super) fn pool(all: &[Choice], rule: &Rule<'_>) -> Vec<(Choice, f64)> {
-    let likely = all.iter().filter(|c| rule.locates(**c));
-    likely
-        .filter_map(|c| Some((*c, rule.rmse_mm(*c)?)))
-        .collect()
+/// All choices whose errors the curves predict, with their RMSE: those that should locate enough presses, and the others.
+pub(super) fn pools(all: &[Choice], rule: &Rule<'_>) -> [Vec<(Choice, f64)>; 2] {
+    let predicted = all.iter().filter_map(|c| Some((*c, rule.rmse_mm(*c)?)));
+    let (likely, unlikely) = predicted.partition(|(c, _)| rule.locates(*c));
+    [likely, unlikely]
+}
+
+/// Moves the neighbours of a choice that competes from the unlikely ones to the pool: the curves of single changes do not know how
+/// few events suffice where several options change.
+pub(super) fn admit(pools: &mut [Vec<(Choice, f64)>; 2], competing: Choice) {
+    let [pool, unlikely] = pools;
+    pool.extend(unlikely.extract_if(.., |(c, _)| {
+        choice::are_neighbours(class(*c), class(competing))
+    }));
 }
 
 /// The pool in random order, without what was measured.
